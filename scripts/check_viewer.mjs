@@ -212,6 +212,7 @@ async function check() {
   expect(wanted.every(isOurs), "nothing else was asked");
   // It asks another server.
   if (!positionals[0]) await looks.housed(page, told);
+  if (!positionals[0]) await looks.stood(page, told);
   expect(said.length === 0, `no error in the console ${said.slice(0, 3)}`);
 }
 
@@ -301,14 +302,14 @@ async function drive(page, metres) {
   const before = await state(page);
   await page.keyboard.down("ShiftLeft");
   await page.keyboard.down("KeyW");
-  let [looks, holes, tilted, frames] = [0, [], 0, []];
+  let [looked, holes, tilted, frames] = [0, [], 0, []];
   const began = Date.now();
   for (let now = before; now.driven < metres && Date.now() - began < 240_000; now = await state(page)) {
     // A look takes a second on a slow machine, and the tank goes on: none near the end, and slowly there.
     if (0.75 * metres < now.driven) await page.keyboard.up("ShiftLeft");
     if (now.driven < 0.4 * metres) {
       const { sky, places } = await page.evaluate("window.tiefort.skyBelowHorizon()");
-      looks += 1;
+      looked += 1;
       if (0 < sky) holes.push(`${sky} pixels from ${places[0]} after ${now.driven.toFixed(0)} m`);
     }
     tilted = Math.max(tilted, ...now.tilt.map(Math.abs));
@@ -323,7 +324,7 @@ async function drive(page, metres) {
   const frame = frames.sort((a, b) => a - b)[Math.floor(frames.length / 2)];
   expect(metres <= after.driven && 0.95 * metres < gone,
     `drove ${gone.toFixed(0)} m; median frame ${frame?.toFixed(0)} ms`);
-  expect(holes.length === 0, `no hole in the ground on the way, ${looks} looks ${holes.join("; ")}`);
+  expect(holes.length === 0, `no hole in the ground on the way, ${looked} looks ${holes.join("; ")}`);
   expect(0.005 < tilted && tilted < 1, `pitched and rolled up to ${((tilted * 180) / Math.PI).toFixed(1)} degrees`);
 }
 

@@ -108,7 +108,7 @@ export async function asked(page, { expect, picture, pause, run, folder, size })
   await until(page, "window.tiefort.state().answer !== null", 30_000);
   const { answer: line } = await state(page);
   const end = ([east, north]) => `${east.toFixed(3)},${north.toFixed(3)},2.5`;
-  const said = run(["sight", folder, "--from", end(line.from), "--to", end(line.to)]);
+  const said = run(["sight", folder, "--from", end(line.ends[0]), "--to", end(line.ends[1])]);
   const isSame = said.startsWith(line.visible ? "visible" : "hidden")
     && said.includes(`clearance  ${line.clearance_m.toFixed(2)} m`);
   expect(isSame, `a line of sight is that of the program: ${said.split("\n")[0]}`);
@@ -221,7 +221,7 @@ export async function housed(page, { expect, picture, pause, serveJob, settled, 
     expect(counts.all === 4 && counts.drawn === 4, `${counts.drawn} of ${counts.all} buildings are drawn`);
     await picture(page, "buildings");
     const shot = () => page.screenshot({ encoding: "base64" });
-    const [withThem, off] = [await shot(), "buildings"];
+    const [withThem, off] = [await shot(), "objects"];
     await page.evaluate((id) => document.getElementById(id).click(), off);
     await pause(1200);
     const without = await shot();
@@ -231,17 +231,67 @@ export async function housed(page, { expect, picture, pause, serveJob, settled, 
     expect(none.drawn === 0, "their switch takes them away");
     await pause(900);
     const link = await page.evaluate("location.search");
-    expect(/layers=/.test(link) && !/buildings/.test(link), `a link says so: ${link}`);
+    expect(/layers=/.test(link) && !/objects/.test(link), `a link says so: ${link}`);
   } finally {
     other.end();
   }
 }
 
+/** Objects of load modules stand in the picture and are counted, in no place twice; the tank stops at a wall, goes
+ * slowly through a wood, and a line of sight is told what hides it. */
+export async function stood(page, { expect, picture, pause, serveJob, settled, open }) {
+  const sections = `[features]\nsources = ["houses.geojson"]\n[objects]\n`;
+  const other = await serveJob("objects", sections, { "houses.geojson": houses(WOOD) });
+  try {
+    await open(page, `east=505550&north=3875500&heading=35&height=${HEIGHT_M}&pitch=-12&range=1000`, other.address);
+    await settled(page);
+    await picture(page, "objects");
+    const { objects, houses: drawnOnly } = await state(page);
+    expect(objects.all === 5 && objects.drawn === 5 && drawnOnly.all === 0,
+      `${objects.drawn} of ${objects.all} objects are drawn, ${drawnOnly.drawn} buildings beside them`);
+    await page.evaluate(() => document.getElementById("objects").click());
+    await pause(700);
+    expect((await state(page)).objects.drawn === 0, "their switch takes them away");
+    // 25 m south of the tallest house, and in the wood.
+    await open(page, "east=505790&north=3875735&heading=0&range=1000", other.address);
+    await page.keyboard.down("KeyW");
+    await until(page, "window.tiefort.state().meets === 'stopped by a building'", 60_000);
+    await page.keyboard.up("KeyW");
+    const { north } = await state(page);
+    expect(3875755 < north && north < 3875760, `the tank stops ${(3875760 - north).toFixed(1)} m before a wall`);
+    await open(page, "east=505575&north=3875575&heading=0&range=1000", other.address);
+    await page.keyboard.down("KeyW");
+    await until(page, "0 < window.tiefort.state().speed && window.tiefort.state().meets === 'in a wood'", 60_000);
+    await pause(3000);
+    const { speed } = await state(page);
+    await page.keyboard.up("KeyW");
+    expect(0 < speed && speed < 3, `it goes at ${speed.toFixed(1)} m/s between stems 4 m apart`);
+    await picture(page, "wood");
+    const body = JSON.stringify({ lines: [[505790, 3875740, 3, 505790, 3875840, 3]], above_ground: true });
+    const { lines: [line] } = await page.evaluate(async (body) => {
+      const headers = { "Content-Type": "application/json" };
+      return (await fetch("/line-of-sight", { method: "POST", headers, body })).json();
+    }, body);
+    expect(line.hidden_by === "building" && line.visible === false, `a line of sight ends at a ${line.hidden_by}`);
+  } finally {
+    other.end();
+  }
+}
+
+/** A wood of 50 m. */
+const WOOD = {
+  type: "Feature", properties: { natural: "wood" },
+  geometry: {
+    type: "Polygon",
+    coordinates: [[[505550, 3875560], [505600, 3875560], [505600, 3875610], [505550, 3875610], [505550, 3875560]]],
+  },
+};
+
 /** Metres over the sample's ground there. */
 const HEIGHT_M = 1180;
 
-/** Four blocks 150 m and more ahead. */
-function houses() {
+/** Four blocks 150 m and more ahead, and what else is given. */
+function houses(...more) {
   const block = ([east, north], side, height) => ({
     type: "Feature", properties: { building: "yes", height: String(height) },
     geometry: {
@@ -253,7 +303,7 @@ function houses() {
     type: "FeatureCollection", crs: { type: "name", properties: { name: "urn:ogc:def:crs:EPSG::32611" } },
     features: [
       block([505650, 3875650], 30, 40), block([505720, 3875620], 25, 15), block([505600, 3875720], 20, 9),
-      block([505760, 3875760], 60, 60),
+      block([505760, 3875760], 60, 60), ...more,
     ],
   });
 }
@@ -306,7 +356,7 @@ export async function curved(page, { expect, run, folder, size }) {
     await page.mouse.click(size.width / 2 + 160, size.height * 0.85);
     await until(page, "window.tiefort.state().answer?.clearance_m !== undefined", 30_000);
     const { answer: line } = await state(page), end = ([east, north]) => `${east.toFixed(3)},${north.toFixed(3)},2.5`;
-    const words = ["sight", folder, "--from", end(line.from), "--to", end(line.to)];
+    const words = ["sight", folder, "--from", end(line.ends[0]), "--to", end(line.ends[1])];
     const said = run(isRound ? [...words, "--curvature"] : words);
     expect(said.includes(`clearance  ${line.clearance_m.toFixed(2)} m`),
       `over the ${isRound ? "round" : "flat"} earth a line clears the ground by ${line.clearance_m.toFixed(3)} m`);

@@ -35,7 +35,9 @@ pub struct Viewed {
     pub overview: Bytes,
     /// Roads and streams that have no triangles of their own; `None` where load modules have lines.
     pub lines: Option<Lines>,
-    /// Buildings, which are drawn only.
+    /// Roads and streams that are seen before load modules come.
+    pub far_lines: Bytes,
+    /// Buildings that are drawn only; none where load modules have objects.
     pub buildings: Buildings,
     /// The ground, once it was asked for, or why there is none.
     pub ground: OnceLock<Result<ProductGround, String>>,
@@ -51,17 +53,22 @@ impl Viewed {
         let product = Product::read(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
         let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
         let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
-        let overview = Overview::read(&area).map_err(damaged)?;
+        let mut overview = Overview::read(&area).map_err(damaged)?;
         let level = product.features.as_ref().map(|(level, _)| level);
         let in_modules = level.is_some() && VERSION_WITH_LINES <= product.job.modules.format;
         let lines = (!in_modules).then(|| level.map(|level| Lines::of(level, area.frame())).unwrap_or_default());
-        let buildings = Buildings::read(&store::Folder::new(folder), &area);
+        overview.lines.add(lines.iter().flat_map(Lines::edges));
+        let far_lines: Bytes = std::mem::take(&mut overview.lines).bytes().into();
+        let has_objects = !overview.objects().is_empty();
+        let buildings =
+            if has_objects { Buildings::default() } else { Buildings::read(&store::Folder::new(folder), &area) };
         Ok(Self {
             folder: folder.to_path_buf(),
             grid: product.grid,
-            description: description(&product, &area, &overview, lines.as_ref(), buildings.count()),
+            description: description(&product, &area, &overview, !far_lines.is_empty(), buildings.count()),
             overview: overview.bytes().into(),
             lines,
+            far_lines,
             buildings,
             ground: OnceLock::new(),
             area,
@@ -69,7 +76,7 @@ impl Viewed {
     }
 }
 
-fn description(product: &Product, area: &Area, overview: &Overview, lines: Option<&Lines>, buildings: usize) -> String {
+fn description(product: &Product, area: &Area, overview: &Overview, has_lines: bool, buildings: usize) -> String {
     let (frame, manifest) = (area.frame(), &product.manifest);
     let (limits, totals) = (&product.job.limits, &manifest.totals);
     let window = limits.window;
@@ -90,8 +97,10 @@ fn description(product: &Product, area: &Area, overview: &Overview, lines: Optio
         "origin_m": frame.origin_m,
         "range_m": VISIBLE_RANGE_M,
         "coarse_steps": overview.steps,
-        "has_lines": lines.is_none_or(|lines| !lines.is_empty()),
+        "has_lines": has_lines,
         "buildings": buildings,
+        "objects": overview.objects(),
+        "is_desert": matches!(product.job.dem.source, job::DemSource::Sample { .. }),
         "height_m": overview.range_m,
         "residual_scale_m": RESIDUAL_SCALE_M,
         "palette": palette(),

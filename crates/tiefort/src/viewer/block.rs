@@ -1,10 +1,11 @@
 //! A block of load modules as the page reads it.
 //!
 //! Load modules follow each other row by row from the south-west, each beginning at a multiple of 4 bytes:
-//! twelve u32 (row, column, vertices, triangles, polygons, posts measured, vertices on the southern, eastern, northern
-//! and western side, vertices and triangles of decks), two f32 (root mean square and largest residual, metres), the
-//! vertices (x and y as u16, z as i32, quanta), the triangles (three u16 each), the four sides (u16 each), the classes
-//! (u8 each), zeros up to a multiple of 4 bytes; then vertices, triangles and classes of decks likewise, and zeros.
+//! thirteen u32 (row, column, vertices, triangles, polygons, posts measured, vertices on the southern, eastern,
+//! northern and western side, vertices and triangles of decks, bytes of objects), two f32 (root mean square and largest
+//! residual, metres), the vertices (x and y as u16, z as i32, quanta), the triangles (three u16 each), the four sides
+//! (u16 each), the classes (u8 each), zeros up to a multiple of 4 bytes; then vertices, triangles and classes of decks
+//! likewise, and zeros; then what stands there, as the part *objects* of a file has it (docs/FORMAT.md).
 
 use load_module_reader::{Block, Module, Vertex};
 
@@ -29,7 +30,8 @@ fn write(module: &Module, out: &mut Vec<u8>) {
     let (vertices, triangles) = (module.vertices.len() as u32, module.triangles.len() as u32);
     let counts = [module.row, module.col, vertices, triangles, module.polygon_count, module.residual.posts];
     let decks = [module.decks.vertices.len() as u32, module.decks.triangles.len() as u32];
-    for word in counts.into_iter().chain(sides).chain(decks) {
+    let objects = if module.objects.is_empty() { Vec::new() } else { module.objects.to_part() };
+    for word in counts.into_iter().chain(sides).chain(decks).chain([objects.len() as u32]) {
         out.extend(word.to_le_bytes());
     }
     for figure in residuals_m(module) {
@@ -47,6 +49,7 @@ fn write(module: &Module, out: &mut Vec<u8>) {
     }
     out.extend(&module.decks.classes);
     out.resize(out.len().next_multiple_of(4), 0);
+    out.extend(objects);
 }
 
 fn write_vertices(vertices: &[Vertex], out: &mut Vec<u8>) {
@@ -87,11 +90,11 @@ mod tests {
         };
         let mut out = Vec::new();
         write(&module, &mut out);
-        let ground = 48 + 8 + 4 * 8 + 2 * 6 + 8 * 2 + 4;
+        let ground = 52 + 8 + 4 * 8 + 2 * 6 + 8 * 2 + 4;
         assert_eq!(out.len(), ground + 3 * 8 + 6 + 2);
         let word = |place: usize| u32::from_le_bytes([0, 1, 2, 3].map(|byte| out[4 * place + byte]));
-        assert_eq!([0, 1, 2, 3, 4, 5, 6, 9, 10, 11].map(word), [3, 5, 4, 2, 1, 4, 2, 2, 3, 1]);
-        assert_eq!([12, 13].map(|place| f32::from_bits(word(place))), [1.0, 2.0]);
+        assert_eq!([0, 1, 2, 3, 4, 5, 6, 9, 10, 11, 12].map(word), [3, 5, 4, 2, 1, 4, 2, 2, 3, 1, 0]);
+        assert_eq!([13, 14].map(|place| f32::from_bits(word(place))), [1.0, 2.0]);
         assert_eq!(out[ground - 4..ground], [0, 1, 0, 0]);
         assert_eq!(out[out.len() - 8..], [0, 0, 1, 0, 2, 0, 2, 0]);
     }

@@ -4,9 +4,10 @@
 //!   /                                      the page, /viewer.js its program
 //!   /api/area                              what the area is, as JSON
 //!   /api/overview                          coarse heights and the figures of every load module (overview.rs)
-//!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole (block.rs)
+//!   /api/modules/SOUTH/WEST/NORTH/EAST     a block of load modules, whole, with what stands there (block.rs)
 //!   /api/levels/LEVEL/SOUTH/WEST/NORTH/EAST   the same at a level of detail
-//!   /api/lines/SOUTH/WEST/NORTH/EAST       roads and streams there (lines.rs)
+//!   /api/lines                             roads and streams of the whole area that are seen from afar (lines.rs)
+//!   /api/lines/SOUTH/WEST/NORTH/EAST       all of a block
 //!   /api/buildings/SOUTH/WEST/NORTH/EAST   buildings there, drawn only (buildings.rs)
 //!   /api/relief                            heights and classes on a fine grid, for shades and shadows (relief.rs)
 //!   /api/dem                               whether the sources can be read, as JSON; else `why` says why not
@@ -62,6 +63,7 @@ pub fn page(folder: &Path, imagery: &[PathBuf]) -> Result<Page, Failure> {
         .route("/api/overview", get(overview))
         .route("/api/modules/{south}/{west}/{north}/{east}", get(modules))
         .route("/api/levels/{level}/{south}/{west}/{north}/{east}", get(level))
+        .route("/api/lines", get(far_lines))
         .route("/api/lines/{south}/{west}/{north}/{east}", get(lines))
         .route("/api/buildings/{south}/{west}/{north}/{east}", get(standing))
         .route("/api/relief", get(relief::answer))
@@ -94,6 +96,10 @@ async fn level(
     UrlPath((level, south, west, north, east)): UrlPath<(u16, u32, u32, u32, u32)>,
 ) -> Response {
     answer([south, west, north, east], viewed, move |viewed, block| block::bytes(viewed, block, level)).await
+}
+
+async fn far_lines(State(viewed): State<Arc<Viewed>>) -> Response {
+    bytes(viewed.far_lines.clone())
 }
 
 async fn lines(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {

@@ -4,7 +4,11 @@
 //! (u32 each), root mean square and largest residual in metres (f32 each; not a number without posts); then the class
 //! at each height (u8).
 
-use load_module_reader::{Area, Block, Module, QUANTA_PER_METRE, ReadError};
+use std::collections::{BTreeMap, HashSet};
+
+use load_module_reader::{Area, Block, Module, ObjectKind, QUANTA_PER_METRE, ReadError};
+
+use super::lines::{Longest, edges_of};
 
 /// Heights that a browser still draws easily.
 const HEIGHTS_MAX: u64 = 60_000;
@@ -15,6 +19,10 @@ pub struct Overview {
     pub steps: u32,
     /// Lowest and highest vertex, metres.
     pub range_m: [f64; 2],
+    /// Roads and streams that load modules have as lines.
+    pub lines: Longest,
+    /// What stands in load modules: the numbers of the objects of each kind, of which each may stand in several.
+    objects: BTreeMap<ObjectKind, HashSet<u64>>,
     heights: Vec<f32>,
     classes: Vec<u8>,
     figures: Vec<u8>,
@@ -29,9 +37,15 @@ impl Overview {
         let (rows, cols) = (area.frame().rows, area.frame().cols);
         let heights = |steps: &u64| (u64::from(rows) * steps + 1) * (u64::from(cols) * steps + 1);
         let steps = [4, 2].into_iter().find(|steps| heights(steps) <= HEIGHTS_MAX).unwrap_or(1) as u32;
-        let no_range = [f64::INFINITY, f64::NEG_INFINITY];
-        let mut overview =
-            Self { steps, range_m: no_range, heights: Vec::new(), classes: Vec::new(), figures: Vec::new() };
+        let mut overview = Self {
+            steps,
+            range_m: [f64::INFINITY, f64::NEG_INFINITY],
+            lines: Longest::default(),
+            objects: BTreeMap::new(),
+            heights: Vec::new(),
+            classes: Vec::new(),
+            figures: Vec::new(),
+        };
         for row in 0..rows {
             overview.add_row(area, row, row + 1 == rows)?;
         }
@@ -42,7 +56,13 @@ impl Overview {
         let frame = area.frame();
         let ground = area.load(Block { south: row, west: 0, north: row + 1, east: frame.cols })?;
         for module in ground.modules() {
-            self.add_figures(module.module());
+            let module = module.module();
+            self.add_figures(module);
+            self.lines.add(edges_of(module, frame.side_m()));
+            let prisms = module.objects.prisms.iter().map(|prism| (prism.kind, prism.id));
+            for (kind, id) in prisms.chain(module.objects.canopies.iter().map(|canopy| (canopy.kind, canopy.id))) {
+                self.objects.entry(kind).or_default().insert(id);
+            }
         }
         let step_m = frame.side_m() / f64::from(self.steps);
         for line in 0..self.steps + u32::from(is_last) {
@@ -70,6 +90,11 @@ impl Overview {
         for figure in residuals_m(module) {
             self.figures.extend(figure.to_le_bytes());
         }
+    }
+
+    /// How many objects of each kind stand in the area, by the kind's name.
+    pub fn objects(&self) -> BTreeMap<&'static str, usize> {
+        self.objects.iter().map(|(kind, ids)| (kind.name(), ids.len())).collect()
     }
 
     /// As the page reads it.

@@ -79,6 +79,8 @@ mod page {
         assert_eq!(area["has_lines"], true);
         let (status, lines) = server.asked("/api/lines/0/0/8/8");
         assert!(status == 200 && !lines.is_empty() && lines.len() % 40 == 0);
+        let of_area = server.asked("/api/lines").1;
+        assert_eq!(of_area.len(), lines.len(), "so few are all seen from afar");
         let part = server.asked("/api/lines/2/0/3/8").1;
         assert!(part.len() < lines.len());
         for edge in lines.chunks(40) {
@@ -119,7 +121,7 @@ mod page {
         let metres = |at: usize| f64::from(f32::from_bits(word(at)));
         assert_eq!((status, [0, 1, 2].map(word)), (200, [2, 4, 3]), "two rings, of four corners and of three");
         let height = |east: f64, north: f64| {
-            let path = format!("/api/profile/1/{east},{north}/{},{north}", east + 1.0);
+            let path = format!("/profile?from={east},{north}&to={},{north}&spacing_m=1", east + 1.0);
             serde_json::from_slice::<Value>(&server.asked(&path).1).unwrap()["height_m"][0].as_f64().unwrap()
         };
         let [floor, roof, size] = [3, 4, 5].map(metres);
@@ -134,6 +136,35 @@ mod page {
         let part = |at: usize| f64::from(f32::from_le_bytes(hanging[at..at + 4].try_into().unwrap()));
         assert!((part(12) - part(8) - 4.0).abs() < 0.01 || part(12) - part(8) < 4.0 + 20.0);
         assert!(height(506_600.0, 3_876_600.0) - 20.0 < part(8));
+    }
+
+    #[test]
+    fn objects_come_with_their_load_modules_and_no_building_is_drawn_twice() {
+        let scene = Scene::with_job("small.toml", &[]);
+        let job = std::fs::read_to_string(scene.path("job.toml")).unwrap();
+        std::fs::write(scene.path("houses.geojson"), HOUSES).unwrap();
+        let sections = "[features]\nsources = [\"houses.geojson\"]\n[objects]\n";
+        std::fs::write(scene.path("job.toml"), format!("{job}\n{sections}")).unwrap();
+        scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+        let modules =
+            load_module_reader::Area::open(scene.path("small.tdb"), load_module_reader::Keep::OnDisk).unwrap();
+        let ground = modules.load(modules.whole()).unwrap();
+        let server = served_in(scene, "small.tdb");
+        let area: Value = serde_json::from_slice(&server.asked("/api/area").1).unwrap();
+        assert_eq!((&area["objects"], &area["buildings"]), (&serde_json::json!({ "building": 3 }), &0.into()));
+        assert!(server.asked("/api/buildings/0/0/8/8").1.is_empty());
+        let all = server.asked("/api/modules/1/1/2/2").1;
+        let word = |at: usize| u32::from_le_bytes(all[4 * at..4 * at + 4].try_into().unwrap()) as usize;
+        let objects = &ground
+            .modules()
+            .iter()
+            .map(|module| module.module())
+            .find(|module| (module.row, module.col) == (1, 1))
+            .unwrap()
+            .objects;
+        assert_eq!(objects.prisms.len(), 2);
+        assert_eq!(all[all.len() - word(12)..], objects.to_part()[..], "the part of the file, as it is");
+        assert_eq!(server.asked("/api/modules/0/0/1/1").1[48..52], [0; 4], "nothing stands there");
     }
 
     #[test]
@@ -164,7 +195,7 @@ mod page {
     }
 
     #[test]
-    fn the_tools_of_the_page_answer_as_the_commands_do() {
+    fn places_are_told_in_other_coordinates() {
         let server = served();
         let value = |path: &str| {
             let (status, body) = server.asked(path);
@@ -172,16 +203,6 @@ mod page {
             assert_eq!(status, 200, "{path}: {text}");
             serde_json::from_str::<Value>(&text).unwrap()
         };
-        let line = value("/api/sight/506000,3875500,1/508500,3878500,1/flat");
-        let words = ["sight", "small.tdb", "--from", "506000,3875500,1", "--to", "508500,3878500,1"];
-        let said = server.scene.run_to(0, &words).stdout;
-        let clearance = format!("clearance  {:.2} m", line["clearance_m"].as_f64().unwrap());
-        assert!(line["visible"] == false && said.starts_with("hidden") && said.contains(&clearance), "{line}: {said}");
-        let (status, seen) = server.asked("/api/viewshed/507000,3876500,20/1/1800/50/flat");
-        assert_eq!((status, seen.len(), &seen[..4]), (200, 8 + 73 * 73, &73u32.to_le_bytes()[..]));
-        assert!(seen[8..].iter().all(|kind| [0, 1, 255].contains(kind)));
-        let profile = value("/api/profile/100/506000,3876000/507000,3876000");
-        assert_eq!(profile["height_m"].as_array().unwrap().len(), 11);
         assert_eq!(value("/api/find/506000%203876000")["place_m"], serde_json::json!([506_000.0, 3_876_000.0]));
         let near = value("/api/find/11S%20506000%203876000");
         assert!((near["place_m"][1].as_f64().unwrap() - 3_876_000.0).abs() < 1e-3, "{near}");
@@ -192,20 +213,7 @@ mod page {
         let both = value("/api/degrees/506000,3876000;507000,3876000");
         assert_eq!((both[0][0].as_f64(), both[0][1].as_f64()), (Some(longitude), Some(latitude)));
         assert!(both[0][0].as_f64() < both[1][0].as_f64() && both.as_array().unwrap().len() == 2);
-        let round = value("/api/sight/506000,3875500,1/508500,3878500,1/round");
-        let said = server.scene.run_to(0, &[&words[..], &["--curvature"]].concat()).stdout;
-        let clearance = format!("clearance  {:.2} m", round["clearance_m"].as_f64().unwrap());
-        assert!(said.contains(&clearance) && round["clearance_m"] != line["clearance_m"], "{round}: {said}");
-        for wrong in [
-            "/api/sight/506000,3875500,1/508500,3878500,1/cube",
-            "/api/degrees/1",
-            "/api/sight/1,2,3/4,5,6/flat",
-            "/api/viewshed/507000,3876500,20/1/900000/1/flat",
-            "/api/viewshed/507000,3876500,20/1/0/1/flat",
-            "/api/profile/0/506000,3876000/507000,3876000",
-            "/api/find/nowhere",
-            "/api/find/11X%201%202",
-        ] {
+        for wrong in ["/api/degrees/1", "/api/find/nowhere", "/api/find/11X%201%202"] {
             assert_eq!(server.asked(wrong).0, 409, "{wrong}");
         }
         let (status, relief) = server.asked("/api/relief");

@@ -4,18 +4,22 @@ import { answer } from "./server.js";
 
 const words = (numbers) => numbers.map((number) => String(Number(number.toFixed(3)))).join(",");
 
-/** Whether one place sees another, both with metres above the ground. */
-export const askSight = async (from, to, earth) =>
-  (await answer(`/api/sight/${words(from)}/${words(to)}/${earth}`)).json();
+/** Whether one place sees another, both with metres above the ground; `how` says which objects are looked at, and
+ * whether the earth is round. */
+export async function askSight(from, to, how) {
+  const body = JSON.stringify({ lines: [[...from, ...to]], above_ground: true, ...how });
+  const request = { method: "POST", headers: { "Content-Type": "application/json" }, body };
+  return (await (await answer("/line-of-sight", request)).json()).lines[0];
+}
 
 /** Heights along a line. */
 export const askProfile = async (from, to, spacing) =>
-  (await answer(`/api/profile/${spacing.toFixed(3)}/${words(from)}/${words(to)}`)).json();
+  (await answer(`/profile?from=${words(from)}&to=${words(to)}&spacing_m=${spacing.toFixed(3)}`)).json();
 
 /** What is seen around a place: places along a side, metres between them, and bytes from the north-west. */
-export async function askViewshed(from, target, range, spacing, earth) {
-  const asked = `/api/viewshed/${words(from)}/${target}/${range}/${spacing}/${earth}`;
-  const bytes = await (await answer(asked)).arrayBuffer();
+export async function askViewshed(from, target, range, spacing, how) {
+  const asked = { from: words(from), target_m: target, range_m: range, spacing_m: spacing, ...how };
+  const bytes = await (await answer(`/viewshed?${new URLSearchParams(asked)}`)).arrayBuffer();
   const [side] = new Uint32Array(bytes, 0, 1);
   return { side, spacing, seen: new Uint8Array(bytes, 8, side * side) };
 }

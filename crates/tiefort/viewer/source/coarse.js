@@ -2,8 +2,9 @@
 import { BufferAttribute, BufferGeometry, Group, Sphere, Vector3 } from "three";
 import { bytes, colorOf, isWater, MADE, numbers, WATER } from "./colors.js";
 import * as looks from "./materials.js";
-import { geometryOf, meshOf, seaTint, tintAt, tintOf } from "./meshes.js";
+import { geometryOf, meshOf, ribbonMesh, seaTint, tintAt, tintOf } from "./meshes.js";
 import { isSea } from "./server.js";
+import { coarseUnder } from "./surface.js";
 
 /** Load modules along the side of a part that is drawn at once, or not where the camera does not look. */
 const PART = 10;
@@ -13,6 +14,8 @@ const STRIDES = [4, 2];
 const OFF_MAX = 0.001;
 /** Metres that the observer moves between two looks at which parts are far away. */
 const LOOK_M = 200;
+/** Pieces of roads and streams along a coarse step, so that they follow the ground. */
+const PIECES = 3;
 
 export class Coarse {
   constructor(area) {
@@ -60,8 +63,33 @@ export class Coarse {
     const from = STRIDES.map((stride) =>
       (rows % stride || cols % stride ? Infinity : offBy(height, rows, cols, stride) / OFF_MAX));
     const ends = [left, down, left + 2 * half[0], down + 2 * half[1]];
-    this.parts.push({ block, mesh, rows, cols, places, ends, from, finely: null, isPlain: true, stride: 1 });
-    this.group.add(mesh);
+    const roads = this.roadsOf(block);
+    this.parts.push({ block, mesh, rows, cols, places, ends, from, roads, finely: null, isPlain: true, stride: 1 });
+    this.group.add(mesh, ...(roads ? [roads.mesh] : []));
+  }
+
+  /** Roads and streams of a part on the coarse ground, and which of their corners are whose load module's. */
+  roadsOf([south, west, north, east]) {
+    const { area } = this, step = area.side_m / area.coarse_steps / PIECES, all = [], ends = [];
+    const on = (x, y) => coarseUnder(area, x, y);
+    for (let row = south; row < north; row++) {
+      for (let col = west; col < east; col++) {
+        const lines = area.lines.get(row * area.cols + col);
+        if (!lines) continue;
+        all.push(...lines);
+        ends.push([(row - south) * (east - west) + col - west, lines.length]);
+      }
+    }
+    if (all.length === 0) return null;
+    const { mesh, counts } = ribbonMesh(area, all, step, on);
+    let corner = 0, line = 0;
+    const runs = ends.map(([module, lines]) => {
+      const first = corner;
+      for (let i = 0; i < lines; i++) corner += counts[line++];
+      return [module, first, corner];
+    });
+    mesh.geometry.setIndex(new BufferAttribute(new Uint32Array(corner), 1));
+    return { mesh, runs };
   }
 
   repaint(colors) {
@@ -146,7 +174,22 @@ export class Coarse {
     index.needsUpdate = true;
     mesh.geometry.setDrawRange(0, end);
     mesh.visible = 0 < end;
+    if (part.roads && part.roads.finely !== finely) indexRoads(part);
   }
+}
+
+/** The roads of a part but for those of load modules that are drawn finely. */
+function indexRoads({ roads, finely }) {
+  const { geometry } = roads.mesh, { index } = geometry;
+  let end = 0;
+  for (const [module, first, last] of roads.runs) {
+    if (finely[module] === "1") continue;
+    for (let corner = first; corner < last; corner++) index.array[end++] = corner;
+  }
+  index.needsUpdate = true;
+  geometry.setDrawRange(0, end);
+  roads.mesh.visible = 0 < end;
+  roads.finely = finely;
 }
 
 /** The triangles of a part some of whose heights are left out, but for those along its border: squares there are fans

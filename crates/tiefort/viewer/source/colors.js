@@ -19,6 +19,20 @@ function along(stops, share) {
 
 const orNothing = (area, stops, share) => (Number.isNaN(share) ? numbers(area.palette.nothing) : along(stops, share));
 
+/** A desert's heights, rock, haze and sky; its lakes and streams are playas and washes, and dry. */
+const DESERT = {
+  heights: ["#dccaa6", "#d3bc94", "#c6a982", "#b69572", "#a58264", "#97755e", "#a08674", "#bba998"],
+  rock: "#8d7260", haze: "#e6ded2", sky: ["#b9c4d0", "#efe9df"],
+};
+const DRY = { lake: "#e9dfc9", river: "#b0936a", stream: "#b0936a" };
+
+/** Lets the built-in desert look like one. */
+export function dried(area) {
+  if (!area.is_desert) return;
+  Object.assign(area.palette, DESERT);
+  area.class_colors = area.classes.map((name, i) => DRY[name] ?? area.class_colors[i]);
+}
+
 const WATERS = new Set(["water", "lake", "river", "stream", "sea"]);
 
 /** Red, green, blue from 0 to 1 as screens have them. */
@@ -53,7 +67,7 @@ export const GROUND = 0, MADE = 127, WATER = 255;
 
 /** Whether a class is water. */
 export function isWater(area, ofClass) {
-  return ofClass === area.water || WATERS.has(area.classes[ofClass]);
+  return ofClass === area.water || (!area.is_desert && WATERS.has(area.classes[ofClass]));
 }
 
 /** What the legend of a way of colouring shows: stops, and words at both ends. */

@@ -13,7 +13,7 @@ const KEYS = [
   ["T J U", "triangles' edges; facets; texture"],
   ["I", "pictures of the ground, where the command was given some"],
   ["M G", "load-module lines; the ground it was made from"],
-  ["0", "buildings, where the area has some: drawn only, they hide no line of sight"],
+  ["0", "buildings and woods, where the area has some"],
   ["R P V", "line of sight between two clicks; distance and profile; what is seen from here (Esc forgets them)"],
   ["N", "go to coordinates: east north, latitude longitude, UTM such as 11S 530000 3899000, MGRS"],
   ["K Z L", "picture with scale and north; record a track; link to this view"],

@@ -1,9 +1,7 @@
 // Buildings as blocks: read where the observer comes near, drawn the largest first, as far as each is seen. They are
 // drawn only: no line of sight knows them.
-import { BufferAttribute, Group, ShapeUtils, Vector2 } from "three";
-import { MADE } from "./colors.js";
-import * as looks from "./materials.js";
-import { geometryOf, meshOf } from "./meshes.js";
+import { Group } from "three";
+import { Blocks } from "./blocks.js";
 import { note } from "./panel.js";
 import { answer } from "./server.js";
 
@@ -17,13 +15,6 @@ const SEEN = 1 / 400;
 const MOVE_M = 40;
 /** How long after buildings could not be read they are asked for again. */
 const AGAIN_MS = 5000;
-/** The layer of the camera of shadows. */
-export const CASTS = 1;
-/** How far normals of walls lean up. */
-const WALLS_LEAN = 0.5;
-/** Colours that walls and roofs have, by their place. */
-const WALLS = [[214, 203, 186], [201, 190, 176], [223, 214, 200], [190, 176, 160], [208, 196, 190]];
-const ROOFS = [[150, 92, 72], [138, 128, 120], [164, 108, 82], [120, 112, 108], [146, 134, 122]];
 
 export class Houses {
   constructor(area) {
@@ -153,56 +144,19 @@ function partOf(area, bytes) {
     at += 3;
     for (const count of counts) {
       rings.push(Array.from({ length: count }, (_, i) =>
-        new Vector2(metres[at + 2 * i] + area.sides[0], metres[at + 2 * i + 1] + area.sides[1])));
+        ({ x: metres[at + 2 * i] + area.sides[0], y: metres[at + 2 * i + 1] + area.sides[1] })));
       at += 2 * count;
     }
-    all.push({ floor, roof, size, rings });
+    all.push({ kind: "building", floor, roof, size, rings });
   }
   if (all.length === 0) return { mesh: null, sizes: [], ends: [] };
   all.sort((a, b) => b.size - a.size);
-  const positions = [], tints = [], ends = [];
-  for (const block of all) {
-    addBlock(block, positions, tints);
-    ends.push(positions.length / 3);
-  }
-  const geometry = geometryOf(new Float32Array(positions));
-  geometry.getAttribute("tint").array.set(tints);
-  geometry.computeVertexNormals();
-  lean(geometry.getAttribute("normal").array);
-  geometry.computeBoundingSphere();
-  const mesh = meshOf(geometry, looks.blocks);
-  mesh.layers.enable(CASTS);
-  mesh.userData.count = all.length;
-  geometry.setDrawRange(0, positions.length / 3);
-  return { mesh, ends, sizes: all.map(({ size }) => size) };
-}
-
-/** Lets the normals of walls lean up, as if they had some light of the ground and of other walls. */
-function lean(normals) {
-  for (let i = 1; i < normals.length; i += 3) if (Math.abs(normals[i]) < 0.1) normals[i] = WALLS_LEAN;
-}
-
-/** Walls and roof of a block, and its underside where it is seen: it lies lower than any ground otherwise. */
-function addBlock({ floor, roof, rings }, positions, tints) {
-  // Neighbours differ, and a building always has the same.
-  const { x, y } = rings[0][0], pick = (list) => list[Math.abs(Math.round(7 * x + 13 * y)) % list.length];
-  const [wall, top] = [[...pick(WALLS), MADE], [...pick(ROOFS), MADE]];
-  const put = (tint, ...corners) => corners.forEach(([place, height]) => {
-    positions.push(place.x, height, -place.y);
-    tints.push(...tint);
+  const blocks = new Blocks(), ends = all.map((block) => {
+    blocks.add(block);
+    return blocks.end;
   });
-  for (const ring of rings) {
-    ring.forEach((a, i) => {
-      const b = ring[(i + 1) % ring.length];
-      put(wall, [a, floor], [b, floor], [b, roof], [a, floor], [b, roof], [a, roof]);
-    });
-  }
-  const corners = rings.flat(), [outer, ...yards] = rings;
-  for (const [a, b, c] of ShapeUtils.triangulateShape(outer, yards)) {
-    const isLeft = 0 < (corners[b].x - corners[a].x) * (corners[c].y - corners[a].y)
-      - (corners[b].y - corners[a].y) * (corners[c].x - corners[a].x);
-    const face = (isLeft ? [a, b, c] : [a, c, b]).map((corner) => corners[corner]);
-    put(top, ...face.map((place) => [place, roof]));
-    put(wall, ...face.reverse().map((place) => [place, floor]));
-  }
+  const mesh = blocks.mesh();
+  mesh.userData.count = all.length;
+  mesh.geometry.setDrawRange(0, blocks.end);
+  return { mesh, ends, sizes: all.map(({ size }) => size) };
 }

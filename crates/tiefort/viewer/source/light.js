@@ -5,8 +5,9 @@
 export const STEEPEST = 4;
 /** Metres around a place that say whether it lies in a hollow, and how much lower is quite hollow. */
 const AROUND_M = 400, HOLLOW_M = 70;
-/** How wide the edge of a shadow is: the tangent of the sun's disc, made larger to look soft on a coarse grid. */
-const SOFT = 0.06;
+/** How wide the edge of a shadow is, the tangent of the sun's disc, made larger to look soft on a coarse grid; and how
+ * many posts it is wide at least, so that it has no steps. */
+const SOFT = 0.06, SOFT_POSTS = 2;
 
 const packed = (rise) =>
   Math.round(127.5 + 127.5 * Math.sign(rise) * Math.sqrt(Math.min(Math.abs(rise) / STEEPEST, 1)));
@@ -29,8 +30,8 @@ function blurred({ wide, high, heights }, reach) {
   return pass(pass(heights, high, wide, wide, 1), wide, high, 1, wide);
 }
 
-/** How much of the sun reaches each post, 0 to 255: the height of the shadow above it is carried from post to post,
- * away from the sun, along the axis nearer to that direction. */
+/** How far each post is from the edge of a shadow, 0 in it to 255 in the sun, the edge lying in the middle: the height
+ * of the shadow above it is carried from post to post, away from the sun, along the axis nearer to that direction. */
 function sunlight({ wide, high, heights, step }, sun) {
   const lit = new Uint8Array(wide * high).fill(255), top = new Float32Array(wide * high);
   const level = Math.hypot(sun[0], sun[1]);
@@ -54,8 +55,8 @@ function sunlight({ wide, high, heights, step }, sun) {
         shadow = a + share * (b - a) - drop;
         next[line] = distance[low] + share * (distance[low + 1] - distance[low]) + way;
       }
-      const soft = Math.max(SOFT * next[line], 0.2 * step);
-      if (height < shadow) lit[place] = Math.round(255 * Math.max(0, 1 - (shadow - height) / soft));
+      const soft = Math.max(SOFT * next[line], SOFT_POSTS * drop);
+      lit[place] = Math.round(255 * Math.min(Math.max(0.5 - (shadow - height) / (2 * soft), 0), 1));
       if (shadow <= height) next[line] = 0;
       top[place] = Math.max(shadow, height);
     }
@@ -72,11 +73,11 @@ export function texels(relief, sun) {
     const [south, north] = [row === 0 ? 0 : wide, row === high - 1 ? 0 : wide];
     for (let col = 0; col < wide; col++, i++) {
       const [west, east] = [col === 0 ? 0 : 1, col === wide - 1 ? 0 : 1];
-      const open = 0.75 + (heights[i] - relief.mean[i]) / (2 * HOLLOW_M);
+      const open = 0.85 + (heights[i] - relief.mean[i]) / (2 * HOLLOW_M);
       data[4 * i] = packed((heights[i + east] - heights[i - west]) / ((east + west) * step));
       data[4 * i + 1] = packed((heights[i + north] - heights[i - south]) / ((north + south) * step));
       data[4 * i + 2] = lit[i];
-      data[4 * i + 3] = Math.round(255 * Math.min(Math.max(open, 0.4), 1));
+      data[4 * i + 3] = Math.round(255 * Math.min(Math.max(open, 0.74), 1));
     }
   }
   return data;

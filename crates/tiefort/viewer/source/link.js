@@ -2,8 +2,8 @@
 import { at } from "./panel.js";
 
 const degrees = (radians) => (radians * 180) / Math.PI, radians = (degrees) => (degrees * Math.PI) / 180;
-const SWITCHES = ["wireframe", "lines", "facets", "texture", "buildings", "dem"];
-const BY_DEFAULT = ["texture", "buildings"];
+const SWITCHES = ["wireframe", "lines", "facets", "texture", "objects", "dem"];
+const BY_DEFAULT = ["texture", "objects"];
 /** Milliseconds between two changes of the address: browsers refuse a hundred in half a minute. */
 const EVERY_MS = 700;
 

@@ -19,6 +19,7 @@ import { switches } from "./switches.js";
 import { Tank } from "./tank.js";
 import { Terrain } from "./terrain.js";
 import { TOOL_KEYS, Tools } from "./tools.js";
+import { Trees } from "./trees.js";
 
 /** Seconds that one picture may stand for, so that a slow machine drives slowly and not in leaps. */
 const STEP_SECONDS_MAX = 0.25;
@@ -64,7 +65,7 @@ export async function start() {
   at("help").addEventListener("click", help);
   at("horizon").addEventListener("click", () => tank.level());
   view.imagery.begin().catch((fault) => note(`The imagery could not be read: ${fault.message}`));
-  scene.add(terrain.group, view.houses.group, tank.model);
+  scene.add(terrain.group, view.houses.group, view.trees.group, tank.model);
   run(view, wishes);
   // What a test asks, and whoever is curious in the console.
   window.tiefort = {
@@ -81,7 +82,8 @@ function viewOf(area, drawing) {
   // Changes with what tools put into the scene; pictures drawn, and milliseconds of the last ones.
   Object.assign(view, { version: 0, count: 0, frames: [], frameMs: 0, drew: false });
   [view.mapAt, view.figuresAt] = [-Infinity, -Infinity];
-  [view.houses, view.casts, view.imagery] = [new Houses(area), new Casts(), new Imagery(area, renderer)];
+  [view.houses, view.trees, view.casts, view.imagery] =
+    [new Houses(area), new Trees(drawing.pace.isSoft), new Casts(), new Imagery(area, renderer)];
   view.map = new SmallMap(area, at("map").querySelector("canvas"), (east, north) => tank.goTo(east, north));
   return view;
 }
@@ -142,11 +144,12 @@ function frame(view, passed, wish, now) {
   else tank.step(seconds, wish);
   tank.place(camera);
   view.houses.follow(tank.east, tank.north);
+  view.trees.follow(terrain, tank.east, tank.north);
   looks.setFrame(now / 1000, tank.east, tank.north, tank.flies || !tank.chases ? 0 : 4.5);
   looks.setSplit(Number(at("split").value));
-  const version = `${terrain.version} ${looks.version()} ${view.version} ${view.houses.version}`;
+  const version = `${terrain.version} ${looks.version()} ${view.version} ${view.houses.version} ${view.trees.version}`;
   if (view.pace.draws(camera, version, now)) {
-    view.casts.draw(view);
+    view.casts.draw(view, now);
     looks.setWidth(renderer.domElement.width);
     renderer.render(scene, camera);
     if (view.drew) view.pace.took(passed);
@@ -170,16 +173,17 @@ function frame(view, passed, wish, now) {
 }
 
 /** What is loaded, seen and stood on. */
-function figures({ terrain, tank, camera, range, frameMs, houses }) {
+function figures({ terrain, tank, camera, range, frameMs, houses, trees }) {
   const under = terrain.under(tank.east, tank.north, tank.ceiling());
   if (under) under.count = terrain.count(under.module);
   const view = terrain.inView(camera, tank.east, tank.north, range);
-  return { tank, under, frameMs, loaded: terrain.loaded(), view, houses: houses.counts() };
+  const objects = { ...terrain.counts(), trees: trees.count };
+  return { tank, under, frameMs, loaded: terrain.loaded(), view, houses: houses.counts(), objects };
 }
 
 /** Everything a test wants to know. */
 function state(view) {
-  const { area, terrain, tank, picked } = view, { under, loaded, view: seen } = figures(view);
+  const { area, terrain, tank, picked } = view, { under, loaded, view: seen, objects } = figures(view);
   const [east, north] = area.inSystem(tank.east, tank.north);
   return {
     east, north, height: tank.height, heading: tank.heading, tilt: tank.tilt, driven: tank.driven, speed: tank.speed,
@@ -187,7 +191,7 @@ function state(view) {
     showsDem: terrain.withDem, isOnDeck: under?.isDeck, modules: loaded.modules, triangles: loaded.triangles,
     coarser: [...terrain.drawn.values()].filter(({ module }) => module.level !== 0)
       .map(({ module }) => [module.level, module.row, module.col, module.counts.triangles]),
-    houses: view.houses.counts(),
+    houses: view.houses.counts(), objects, meets: tank.meets,
     blocks: terrain.blocks, fullest: loaded.fullest, view: seen, frameMs: view.frameMs, picked,
     flies: tank.flies, altitude: tank.altitude, turned: tank.turned, pitch: tank.pitch, gear: tank.gear,
     drifts: tank.drifts, lit: view.lit === true, frames: view.frames, count: view.count,

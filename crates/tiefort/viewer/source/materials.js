@@ -8,6 +8,7 @@ import { numbers } from "./colors.js";
 import { noiseTexture } from "./noise.js";
 import { RIBBON_VERTEX } from "./ribbon_shader.js";
 import { GROUND_FRAGMENT, GROUND_VERTEX, PICTURE_LEVELS_MAX, SKY_FRAGMENT, SKY_VERTEX } from "./shaders.js";
+import { LEAVES_VERTEX, TREE_VERTEX, WALL_VERTEX } from "./standing_shaders.js";
 import { lightOf } from "./sun.js";
 
 /** Metres at which two thirds of what is seen are haze. */
@@ -34,7 +35,8 @@ const shared = {
   overMap: { value: clear }, overPlace: { value: new Vector4(0, 0, 1, 0) },
   smoothM: { value: new Vector2(1500, 3000) }, softness: { value: SOFTNESS }, seconds: { value: 0 },
   split: { value: new Vector2() }, splitSide: { value: 0 },
-  blob: { value: new Vector4() }, castMap: { value: clear }, castPlace: { value: new Matrix4() },
+  leavesM: { value: new Vector3() }, blob: { value: new Vector4() },
+  castMap: { value: null }, castPlace: { value: new Matrix4() },
   castReach: { value: new Vector4() },
   pictureMap: { value: noPicture }, pictureStrength: { value: 0 }, pictureLevels: { value: 0 }, pictureM: { value: 1 },
   pictureCorner: { value: new Vector2() },
@@ -94,10 +96,14 @@ for (const { uniforms } of [cliffs, apron]) {
   uniforms.smoothM = { value: new Vector2(1e8, 2e8) };
   uniforms.softness = { value: 0 };
 }
-/** Buildings, lit as the blocks they are. */
-export const blocks = groundMaterial(["PLAIN"], {});
-blocks.uniforms.smoothM = { value: new Vector2(1e8, 2e8) };
-blocks.uniforms.softness = { value: 0 };
+/** What stands on the ground, lit as it is: buildings and walls, layers of leaves, trees. */
+export const blocks = groundMaterial(["PLAIN", "WALLED"], { vertexShader: WALL_VERTEX });
+export const leaves = groundMaterial(["PLAIN", "LEAVES"], { vertexShader: LEAVES_VERTEX });
+export const trees = groundMaterial(["PLAIN", "TREES"], { vertexShader: TREE_VERTEX });
+for (const { uniforms } of [blocks, leaves, trees]) {
+  uniforms.smoothM = { value: new Vector2(1e8, 2e8) };
+  uniforms.softness = { value: 0 };
+}
 export const decks = groundMaterial([], { side: DoubleSide });
 export const ribbons = groundMaterial([], {
   vertexShader: RIBBON_VERTEX,
@@ -108,6 +114,11 @@ export const ribbons = groundMaterial([], {
 export function setPalette(area) {
   shared.rockTint.value.setRGB(...numbers(area.palette.rock));
   shared.topTint.value.setRGB(...numbers(area.palette.sky[0]));
+}
+
+/** Metres within which every tree of a wood stands for itself, from which on one in four does, and up to which. */
+export function setLeaves(all, some, most) {
+  shared.leavesM.value.set(all, some, most);
 }
 
 export function skyMesh() {
@@ -156,7 +167,7 @@ export function setOverlay(texture, west, north, metres) {
 /** The shadows of blocks: depths as the sun sees them, how a place becomes one of theirs, and how far they reach. */
 export function setCasts(casts) {
   changes += 1;
-  shared.castMap.value = casts?.map ?? clear;
+  shared.castMap.value = casts?.map ?? null;
   if (casts) shared.castPlace.value.copy(casts.place);
   if (casts) shared.castReach.value.copy(casts.reach);
   else shared.castReach.value.w = 0;

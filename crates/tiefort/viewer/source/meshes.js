@@ -56,20 +56,29 @@ export function deckMesh(area, decks) {
 
 /** Roads and streams of a load module that are lines of its TIN, as ribbons on the ground. */
 export function roadMesh(area, roads, surface) {
-  const positions = [], tints = [], asides = [];
-  const on = (east, north, height) =>
-    [east, Math.max(height, triangleUnder(surface, east, north)?.height ?? height) + RIBBON_LIFT_M, -north];
+  const on = (east, north, height) => Math.max(height, triangleUnder(surface, east, north)?.height ?? height);
+  return ribbonMesh(area, roads, RIBBON_M_MAX, on).mesh;
+}
+
+/** Roads and streams as ribbons in pieces of so many metres at most, at the heights that `on` gives places, and how
+ * many corners each has. */
+export function ribbonMesh(area, roads, most, on) {
+  const positions = [], tints = [], asides = [], counts = [];
   for (const { class: of, width, ends: [a, b] } of roads) {
     const run = b.map((to, axis) => to - a[axis]), length = Math.hypot(run[0], run[1]);
+    counts.push(6 * Math.ceil(length / most));
     if (length === 0) continue;
     const half = Math.max(width, RIBBON_WIDTH_M_MIN) / 2;
     const [right, up] = [(half * run[1]) / length, (-half * run[0]) / length];
     const across = (share) => {
       const [east, north, height] = a.map((from, axis) => from + share * run[axis]);
-      return [on(east - right, north - up, height), on(east + right, north + up, height)];
+      return [-1, 1].map((side) => {
+        const [x, y] = [east + side * right, north + side * up];
+        return [x, on(x, y, height) + RIBBON_LIFT_M, -y];
+      });
     };
     // Too narrow to mirror anything: seen flat, a stream would glitter.
-    const pieces = Math.ceil(length / RIBBON_M_MAX), tint = [...bytes(colorOf.cover(area, of) ?? colorOf.deck()), MADE];
+    const pieces = Math.ceil(length / most), tint = [...bytes(colorOf.cover(area, of) ?? colorOf.deck()), MADE];
     for (let piece = 0; piece < pieces; piece++) {
       const [left, other] = across(piece / pieces), [farLeft, farOther] = across((piece + 1) / pieces);
       [left, other, farOther, left, farOther, farLeft].forEach((corner, i) => {
@@ -86,7 +95,7 @@ export function roadMesh(area, roads, surface) {
   geometry.setAttribute("aside", new BufferAttribute(new Float32Array(asides), 2));
   geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
-  return meshOf(geometry, looks.ribbons);
+  return { mesh: meshOf(geometry, looks.ribbons), counts };
 }
 
 /** The tint of a class that has a colour of its own. */

@@ -6,7 +6,7 @@ const grouped = (number) => Math.round(number).toLocaleString("en-US");
 const degrees = (radians) => (radians * 180) / Math.PI;
 
 /** The counters: rows of a name and a value. */
-export function showFigures(area, { tank, loaded, view, under, frameMs, houses }) {
+export function showFigures(area, { tank, loaded, view, under, frameMs, houses, objects }) {
   const limits = area.limits, place = area.inSystem(tank.east, tank.north).map((metres) => metres.toFixed(0));
   const here = under ? `${under.module.row},${under.module.col}` : "–";
   const count = under ? `${under.count} of ${limits.per_load_module}` : "–";
@@ -31,6 +31,10 @@ export function showFigures(area, { tank, loaded, view, under, frameMs, houses }
     rows.splice(7, 0, ["farther, coarser", `${grouped(triangles)} in ${grouped(modules)}`]);
   }
   if (area.buildings) rows.splice(-1, 0, ["buildings drawn", `${grouped(houses.drawn)} of ${grouped(houses.all)}`]);
+  if (objects.all) {
+    rows.splice(-1, 0, ["objects drawn", `${grouped(objects.drawn)} of ${grouped(objects.all)}`],
+      ["trees nearby", grouped(objects.trees)]);
+  }
   const table = at("figures").querySelector("table");
   while (table.rows.length < rows.length) [0, 1].forEach(((row) => () => row.insertCell())(table.insertRow()));
   rows.forEach((row, i) => row.forEach((words, j) => {
@@ -52,7 +56,9 @@ export function showHud({ tank }) {
   const above = tank.height === null ? "" : ` (${Math.max(tank.altitude - tank.height, 0).toFixed(0)} m above ground)`;
   const height = tank.flies ? `${tank.altitude.toFixed(0)} m${above}` : `${tank.height?.toFixed(1) ?? "-"} m`;
   const speed = `${(3.6 * Math.abs(tank.speed)).toFixed(0)} km/h`;
-  const words = `${wind} ${heading.toFixed(0)}\u00b0 \u00b7 ${height} \u00b7 ${speed} \u00b7 gear ${tank.gear + 1}`;
+  const meets = !tank.flies && tank.meets ? ` \u00b7 ${tank.meets}` : "";
+  const gear = `gear ${tank.gear + 1}${meets}`;
+  const words = `${wind} ${heading.toFixed(0)}\u00b0 \u00b7 ${height} \u00b7 ${speed} \u00b7 ${gear}`;
   const place = at("hud").querySelector("span");
   if (place.textContent !== words) place.textContent = words;
 }

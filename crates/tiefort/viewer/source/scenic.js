@@ -6,6 +6,9 @@ const TRIED = 36, DIRECTIONS = 12, RAYS = 7, LOOKS = 14;
 const VIEW_RADIANS = 0.85, REACH_M = 9000, ABOVE_M = 160;
 /** How much a place that sees water gains. */
 const SHORE = 0.035;
+/** How much a place that sees towns gains at most: between such distances, a load module with so many pieces of roads
+ * is one. */
+const TOWN = 3, TOWN_M = [700, 3000], TOWN_ROADS = 60, TOWN_SEEN = 6;
 /** Metres that ground a kilometre around should differ. */
 const ROUGH_M = 250;
 
@@ -28,12 +31,16 @@ function views(area, reach) {
     const way = direction + VIEW_RADIANS * (ray / (RAYS - 1) - 0.5);
     return distances.map((away) => ({ away, right: (away * Math.sin(way)) / step, up: (away * Math.cos(way)) / step }));
   });
-  return directions.map((direction) => ({ ...area.coarse, isWet, direction, rays: raysOf(direction) }));
+  const { rows, cols, coarse_steps: steps, lines } = area, busy = new Float32Array(rows * cols);
+  for (const [key, roads] of lines) busy[key] = Math.min(roads.length / TOWN_ROADS, 1) ** 2;
+  const town = (row, col) =>
+    busy[Math.min(Math.floor(row / steps), rows - 1) * cols + Math.min(Math.floor(col / steps), cols - 1)];
+  return directions.map((direction) => ({ ...area.coarse, isWet, town, direction, rays: raysOf(direction) }));
 }
 
 /** What is seen from a place of the grid: how far the ground in view goes up and down, and how high it stands. */
-function score({ wide, high, heights, classes, isWet, direction, rays }, [across, along], eye) {
-  let [relief, skyline, outside, water] = [0, 0, 0, 0];
+function score({ wide, high, heights, classes, isWet, town, direction, rays }, [across, along], eye) {
+  let [relief, skyline, outside, water, towns] = [0, 0, 0, 0, 0];
   for (const ray of rays) {
     let [horizon, before] = [-0.3, undefined];
     for (const { away, right, up } of ray) {
@@ -48,12 +55,15 @@ function score({ wide, high, heights, classes, isWet, direction, rays }, [across
       relief += Math.abs(height - (before ?? height));
       before = height;
       if (isWet[classes[index]]) water += 1;
+      if (TOWN_M[0] < away && away < TOWN_M[1]) towns += town(row, col);
     }
     skyline += Math.min(horizon, 0.25) / RAYS;
   }
   // Light comes from the north-west: ground looks best with it from the side.
   const bySide = 1 + 0.3 * Math.abs(Math.sin(direction + Math.PI / 4)), shores = 1 + Math.min(water, 12) * SHORE;
-  return relief * shores * bySide * (0.3 + Math.max(skyline + 0.05, 0) * 4) * (1 - (0.8 * outside) / (RAYS * LOOKS));
+  const lived = 1 + TOWN * Math.min(towns / TOWN_SEEN, 1);
+  const open = 1 - (0.8 * outside) / (RAYS * LOOKS);
+  return relief * shores * lived * bySide * (0.3 + Math.max(skyline + 0.05, 0) * 4) * open;
 }
 
 /** How much the heights a kilometre around a place differ. */

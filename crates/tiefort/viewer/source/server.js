@@ -1,6 +1,9 @@
 // Asks the server, and reads what it answers. Places are metres east and north of `corner`, a corner of load modules in
 // the middle of the area, so that they are small numbers, whole in 1/128 m, that a 32-bit float holds exactly.
 
+import { dried } from "./colors.js";
+import { objectsAt } from "./objects.js";
+
 const QUANTA = 128;
 /** Metres that a TIN leaves the sea's level by, and the share of an area from which on level ground at 0 is the sea:
  * rasters that know no other name for it have it so. */
@@ -11,16 +14,18 @@ const isAtSeaLevel = (height) => Math.abs(height) < SEA_M;
 export const isSea = (area, heights) => area.hasSea && heights.every(isAtSeaLevel);
 
 /** What the server answers; fails with its words where it has none. */
-export async function answer(path) {
-  const response = await fetch(path);
-  if (!response.ok) throw new Error(await response.text());
-  return response;
+export async function answer(path, request) {
+  const response = await fetch(path, request);
+  if (response.ok) return response;
+  const words = await response.text(), isJson = response.headers.get("content-type") === "application/json";
+  throw new Error(isJson ? JSON.parse(words).error : words);
 }
 
 /** What the area is, with its overview: heights and classes on a coarse grid, figures of every load module. */
 export async function readArea() {
-  const answers = [answer("/api/area"), answer("/api/overview")];
+  const answers = [answer("/api/area"), answer("/api/overview"), answer("/api/lines")];
   const area = await (await answers[0]).json(), bytes = await (await answers[1]).arrayBuffer();
+  dried(area);
   const [wide, high] = [area.cols * area.coarse_steps + 1, area.rows * area.coarse_steps + 1];
   area.corner = [Math.floor(area.rows / 2), Math.floor(area.cols / 2)];
   const classes = new Uint8Array(bytes, bytes.byteLength - wide * high);
@@ -44,6 +49,7 @@ export async function readArea() {
   area.inSystem = (east, north) => [area.origin_m[0] + east - area.sides[0], area.origin_m[1] + north - area.sides[1]];
   area.fromSystem = (east, north) =>
     [east - area.origin_m[0] + area.sides[0], north - area.origin_m[1] + area.sides[1]];
+  area.lines = linesIn(area, await (await answers[2]).arrayBuffer());
   return area;
 }
 
@@ -62,21 +68,29 @@ export async function readModules(area, [south, west, north, east], level) {
 /** Puts roads and streams that are lines of the TIN into the load modules of a half-open block. */
 export async function readLines(area, [south, west, north, east], modules) {
   const bytes = await (await answer(`/api/lines/${south}/${west}/${north}/${east}`)).arrayBuffer();
-  const found = new Map(modules.map((module) => [module.row * area.cols + module.col, module]));
-  const words = new Uint32Array(bytes), metres = new Float32Array(bytes);
+  const lines = linesIn(area, bytes);
+  for (const module of modules) module.lines = lines.get(module.row * area.cols + module.col);
+}
+
+/** The lines of an answer by their load modules, row * cols + col. */
+function linesIn(area, bytes) {
+  const words = new Uint32Array(bytes), metres = new Float32Array(bytes), found = new Map();
   const place = (at) => [metres[at] + area.sides[0], metres[at + 1] + area.sides[1], metres[at + 2]];
   for (let at = 0; at < words.length; at += 10) {
     const line = { class: words[at + 2], width: metres[at + 3], ends: [place(at + 4), place(at + 7)] };
-    (found.get(words[at] * area.cols + words[at + 1]).lines ??= []).push(line);
+    const key = words[at] * area.cols + words[at + 1];
+    if (!found.has(key)) found.set(key, []);
+    found.get(key).push(line);
   }
+  return found;
 }
 
 function moduleAt(area, bytes, start) {
-  const words = new Uint32Array(bytes, start, 12), [row, col, vertexCount, triangleCount, polygons, posts] = words;
-  const sideCounts = words.subarray(6, 10), [deckVertices, deckTriangles] = words.subarray(10);
-  const [rms, largest] = new Float32Array(bytes, start + 48, 2);
+  const words = new Uint32Array(bytes, start, 13), [row, col, vertexCount, triangleCount, polygons, posts] = words;
+  const sideCounts = words.subarray(6, 10), [deckVertices, deckTriangles, objectBytes] = words.subarray(10);
+  const [rms, largest] = new Float32Array(bytes, start + 52, 2);
   const corner = [(col - area.corner[1]) * area.side_m, (row - area.corner[0]) * area.side_m];
-  let at = start + 56;
+  let at = start + 60;
   const points = pointsAt(bytes, at, vertexCount, corner);
   at += 8 * vertexCount;
   const triangles = new Uint16Array(bytes, at, 3 * triangleCount);
@@ -93,11 +107,12 @@ function moduleAt(area, bytes, start) {
     triangles: new Uint16Array(bytes, at + 8 * deckVertices, 3 * deckTriangles),
     classes: new Uint8Array(bytes, at + 8 * deckVertices + 6 * deckTriangles, deckTriangles),
   };
-  at += 8 * deckVertices + 7 * deckTriangles;
+  at = 4 * Math.ceil((at + 8 * deckVertices + 7 * deckTriangles) / 4);
+  const objects = objectBytes === 0 ? null : objectsAt(bytes, at, corner, area.side_m);
   const tin = { points, triangles, sides };
   // What limits count: decks as the ground.
   const counts = { triangles: triangleCount + deckTriangles, polygons: polygons + deckTriangles };
-  return [{ row, col, counts, posts, rms, largest, classes, tin, decks }, 4 * Math.ceil(at / 4)];
+  return [{ row, col, counts, posts, rms, largest, classes, tin, decks, objects }, at + objectBytes];
 }
 
 /** Vertices of a load module whose south-west corner is at `[west, south]`. */

@@ -2,6 +2,7 @@
 // pictures, so that ground in full light has the colour that the palette gives it.
 import { CAST } from "./casts_shader.js";
 import { STEEPEST } from "./light.js";
+import { LEAVES, WINDOWS } from "./standing_shaders.js";
 
 /** Haze between the eye and what it sees; the same behind everything, so that ground meets sky without a line. */
 const HAZE = /* glsl */ `
@@ -78,6 +79,12 @@ export const GROUND_FRAGMENT = /* glsl */ `
   #ifdef PICTURED
   ${PICTURES}
   #endif
+  #ifdef WALLED
+  ${WINDOWS}
+  #endif
+  #ifdef LEAVES
+  ${LEAVES}
+  #endif
 
   vec3 water(vec3 toward, float away, float lit) {
     vec2 at = place.xz / 38.0;
@@ -122,7 +129,22 @@ export const GROUND_FRAGMENT = /* glsl */ `
       vec3 hard = mix(fair, vec3(0.9, 0.5, 0.15), clamp((steep - 0.25) / 0.2, 0.0, 1.0));
       base = mix(base, steep < 0.45 ? hard : vec3(0.72, 0.08, 0.08), 0.85);
     #endif
-    return base * (skyTint * (0.55 + 0.45 * n.y) * open + sunTint * max(dot(n, sunWay), 0.0) * lit);
+    float bright = max(dot(n, sunWay), 0.0);
+    vec3 soft = skyTint * (0.55 + 0.45 * n.y) * open + 0.06 * sunTint;
+    #ifdef PLAIN
+      // Ground and walls around throw light on what is upright.
+      soft = skyTint * (0.86 + 0.14 * n.y) * mix(open, 1.0, 0.6) + 0.14 * sunTint * max(sunWay.y, 0.0);
+    #endif
+    #ifdef WALLED
+      base = glazed(base);
+    #endif
+    #ifdef LEAVES
+      base = leaved(base, n, away);
+    #endif
+    #ifdef TREES
+      bright = max(0.3 + 0.7 * dot(n, sunWay), 0.0);
+    #endif
+    return base * (soft + sunTint * bright * lit);
   }
 
   void main() {
@@ -145,7 +167,10 @@ export const GROUND_FRAGMENT = /* glsl */ `
     vec3 n = normalize(mix(facing, smoothly, far));
     vec2 from = place.xz - blob.xy;
     float under = blob.w < 0.5 ? 1.0 : 1.0 - 0.55 * (1.0 - smoothstep(0.4, 1.0, dot(from, from) / (blob.z * blob.z)));
-    float lit = relief.b * under * castLight(place, facing);
+    float lit = smoothstep(0.3, 0.7, relief.b) * under;
+    #if !defined(LEAVES) && !defined(TREES)
+      lit *= castLight(place, facing);
+    #endif
     vec3 color = 0.75 < own.a ? water(toward, away, lit) : ground(away, n, smoothly, lit, relief.a * under);
     #ifdef OVERLAID
       vec4 over = texture(overMap, (place.xz - overPlace.xy) / overPlace.z);

@@ -22,8 +22,8 @@ export function lightOf(sun, haze) {
   const day = Math.min(Math.max(sun[2] / 0.45, 0), 1), dusk = Math.min(Math.max((sun[2] + 0.12) / 0.25, 0), 1);
   const strength = sun[2] <= 0 ? 0 : Math.min(1, 0.25 + day);
   return {
-    sun: mix([0.95, 0.5, 0.25], [0.95, 0.9, 0.77], day).map((part) => part * strength),
-    sky: mix([0.16, 0.17, 0.2], mix([0.42, 0.4, 0.42], [0.43, 0.45, 0.5], day), dusk),
+    sun: mix([0.95, 0.5, 0.25], [0.84, 0.79, 0.67], day).map((part) => part * strength),
+    sky: mix([0.16, 0.17, 0.2], mix([0.42, 0.4, 0.42], [0.51, 0.53, 0.58], day), dusk),
     haze: mix([0.13, 0.14, 0.17], mix(haze.map((part, i) => part * [0.98, 0.84, 0.72][i]), haze, day), dusk),
     glow: mix([1, 0.62, 0.32], [1, 0.97, 0.88], day).map((part) => part * dusk),
   };

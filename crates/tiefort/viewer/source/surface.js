@@ -35,6 +35,16 @@ function* trianglesUnder(surface, east, north) {
   }
 }
 
+/** Height of the coarse grid's triangles at a place of the area. */
+export function coarseUnder(area, east, north) {
+  const { wide, high, heights } = area.coarse, step = area.side_m / area.coarse_steps;
+  const [across, up] = [(east - area.sides[0]) / step, (north - area.sides[1]) / step];
+  const [col, row] = [[across, wide], [up, high]].map(([at, end]) => Math.min(Math.max(Math.floor(at), 0), end - 2));
+  const at = row * wide + col, [right, top] = [across - col, up - row];
+  const [a, b, c, d] = [heights[at], heights[at + 1], heights[at + wide + 1], heights[at + wide]];
+  return top <= right ? a + right * (b - a) + top * (c - b) : a + top * (d - a) + right * (c - d);
+}
+
 /** Height of a coarse grid at a place along one of its lines: `[row, col]` in coarse steps, one of them whole. */
 export function coarseHeight({ wide, high, heights }, row, col) {
   const [r, c] = [Math.min(Math.floor(row), high - 1), Math.min(Math.floor(col), wide - 1)];

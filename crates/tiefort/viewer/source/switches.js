@@ -5,7 +5,7 @@ import { unpick } from "./pick.js";
 
 const KEYS = {
   KeyT: "wireframe", KeyM: "lines", KeyG: "dem", KeyF: "fly", KeyH: "chase", KeyJ: "facets", KeyU: "texture",
-  KeyI: "imagery", Digit0: "buildings",
+  KeyI: "imagery", Digit0: "objects",
 };
 const PANELS = { KeyY: "layers", KeyO: "figures" };
 /** The lowest place of the light's slider means light as on maps. */
@@ -18,7 +18,8 @@ export function switches(view, { light }) {
     const colors = at("colors").value, is = (id) => at(id).checked;
     if (colors !== terrain.colors) map.repaint(colors === "going" || colors === "levels" ? "height" : colors);
     terrain.show({ colors, lines: is("lines") });
-    view.houses.show(is("buildings"));
+    view.houses.show(is("objects"));
+    terrain.showObjects(is("objects"));
     looks.setLook({
       wireframe: is("wireframe"), facets: is("facets"), range: view.range, going: colors === "going",
       texture: is("texture") && (colors === "height" || colors === "going"),
@@ -51,7 +52,7 @@ export function switches(view, { light }) {
     at("hour").nextElementSibling.textContent = view.hour === null ? "as on a map" : `${Math.floor(value)}:${minutes}`;
     light();
   };
-  const looked = ["colors", "wireframe", "lines", "facets", "texture", "buildings"];
+  const looked = ["colors", "wireframe", "lines", "facets", "texture", "objects"];
   for (const id of looked) at(id).addEventListener("change", shown);
   at("dem").addEventListener("change", dem);
   at("imagery").addEventListener("change", imagery);
@@ -60,7 +61,10 @@ export function switches(view, { light }) {
   at("chase").addEventListener("change", () => (tank.chases = at("chase").checked));
   at("range").addEventListener("input", range);
   at("hour").addEventListener("input", hour);
-  at("buildings").parentElement.hidden = !area.buildings;
+  const { all } = terrain.counts(), drawnOnly = area.buildings ? ", drawn only" : "";
+  at("objects").parentElement.hidden = !(all || area.buildings);
+  at("past").parentElement.hidden = !all;
+  at("standing").textContent = all ? `buildings and woods: ${all.toLocaleString("en-US")}` : `buildings${drawnOnly}`;
   at("range").value = view.range;
   range();
   hour();

@@ -14,6 +14,12 @@ const HALF_LENGTH = 3, HALF_WIDTH = 1.4;
 /** How much higher than its tracks a deck may begin for the tank to drive on it, and how far it goes before it looks
  * again what it stands on: so it stays on a bridge, or under it. */
 const STEP_M = 1.5, LOOK_M = 3;
+/** How far before and behind its middle the tank meets what stands there, how wide it is there, and between which
+ * heights above the ground. */
+const NOSE_M = 2, REACH_M = 1.6, LOW_M = 0.3, TALL_M = 3;
+/** Metres between stems that it fits through, metres a second for each metre more, through what is lower than trees,
+ * and out of what it should not be in. */
+const FITS_M = 3.4, BY_ROOM = 3, TREES_M = 5, BUSHES_MPS = 5, OUT_MPS = 1;
 
 export class Tank {
   constructor(terrain, east, north, heading) {
@@ -22,6 +28,8 @@ export class Tank {
     this.drifts = false;
     // Where the observer looks, beyond where the tank points; and how far behind it he is.
     Object.assign(this, { turned: 0, pitch: -0.12, away: 22, chases: true });
+    // What keeps it from driving on, or slows it.
+    this.meets = null;
     // The tank's own axes: right, up, backwards.
     this.axes = [new Vector3(1, 0, 0), new Vector3(0, 1, 0), new Vector3(0, 0, 1)];
     this.model = model();
@@ -56,16 +64,50 @@ export class Tank {
 
   drive(seconds, { forward, right, hurry, brake }) {
     const times = hurry ? HURRY : 1;
-    const wanted = brake ? 0 : forward * Math.min(forward < 0 ? BACK_MPS : Infinity, this.topSpeed) * times;
+    const slow = this.slowedTo(this.found(0));
+    const most = Math.min(forward < 0 ? BACK_MPS : Infinity, this.topSpeed) * times;
+    const wanted = brake ? 0 : forward * Math.min(most, slow);
     const gain = brake ? BRAKE_MPS2 * Math.max(1, Math.abs(this.speed) / this.topSpeed) : GAIN_MPS2 * times;
     const change = gain * seconds * (forward === 0 && !brake ? 2 : 1);
     this.speed += Math.min(Math.max(wanted - this.speed, -change), change);
+    // Stems and leaves brake at once.
+    this.speed = Math.min(Math.max(this.speed, -slow), slow);
     this.heading += right * TURN_RADPS * seconds * (this.speed < 0 ? -1 : 1);
     const way = this.speed * seconds, looks = Math.ceil(Math.abs(way) / LOOK_M);
     for (let look = 0; look < looks; look++) {
+      if (this.stops(way / looks)) break;
       this.move(this.heading, way / looks);
       this.height = this.terrain.under(this.east, this.north, this.ceiling())?.height ?? this.height;
     }
+  }
+
+  /** What stands so many metres ahead. */
+  found(ahead) {
+    const low = this.height ?? 0;
+    return this.terrain.met(this.east + ahead * Math.sin(this.heading), this.north + ahead * Math.cos(this.heading),
+      REACH_M, low + LOW_M, low + TALL_M);
+  }
+
+  /** How fast it is at most among woods, metres a second. */
+  slowedTo({ woods }) {
+    const speeds = woods.map(({ height, spacing }) =>
+      (height < TREES_M ? BUSHES_MPS : Math.max((spacing - FITS_M) * BY_ROOM, OUT_MPS)));
+    const slow = Math.min(...speeds, Infinity);
+    if (slow < Infinity) this.meets = `in a ${woods[speeds.indexOf(slow)].kind}`;
+    else if (OUT_MPS < Math.abs(this.speed)) this.meets = null;
+    return slow;
+  }
+
+  /** Whether it stops before it goes so far: at a wall, or at stems that stand too close; not where it is there
+   * already, since it has to get out. */
+  stops(way) {
+    const nose = way < 0 ? -NOSE_M : NOSE_M, isClosed = ({ height, spacing }) => TREES_M <= height && spacing < FITS_M;
+    const [next, now] = [this.found(nose + way), this.found(nose)];
+    const wood = next.woods.find(isClosed), wall = next.prism;
+    const what = wall && !now.prism ? wall : wood && !now.woods.some(isClosed) ? wood.kind : null;
+    if (what === null) return false;
+    [this.speed, this.meets] = [0, `stopped by a ${what}`];
+    return true;
   }
 
   /** Up to what height a surface may lie that the tank drives on, or that the observer flies over. */

@@ -1,9 +1,12 @@
 // The block of load modules around the observer: loaded, drawn, dropped; around it load modules at coarser levels of
 // detail, where the database has them; beyond these the area as it is coarsely.
 import { Frustum, Group, Matrix4 } from "three";
+import { Blocks } from "./blocks.js";
+import { canopyMeshes } from "./canopies.js";
 import { apron, Coarse } from "./coarse.js";
 import * as looks from "./materials.js";
 import { deckMesh, moduleLines, moduleMesh, paint, roadMesh } from "./meshes.js";
+import { metAt } from "./objects.js";
 import { checkDem, readLines, readModules, readPosts } from "./server.js";
 import { deckUnder, triangleUnder } from "./surface.js";
 import { wallMeshes } from "./walls.js";
@@ -23,8 +26,8 @@ export class Terrain {
   constructor(area) {
     this.area = area;
     this.group = new Group();
-    // By row * cols + col: {module, surface, mesh, beside, decks, roads}. Levels that differ fit together, so that a
-    // load module stays until the one in its place has come.
+    // By row * cols + col: {module, surface, mesh, beside, decks, roads, stands}. Levels that differ fit together, so
+    // that a load module stays until the one in its place has come.
     this.drawn = new Map();
     this.colors = "height";
     this.withLines = this.withDem = false;
@@ -35,8 +38,11 @@ export class Terrain {
     // What has come and is not drawn yet.
     this.came = [];
     this.fault = null;
-    // Changes with what is drawn.
-    this.version = 0;
+    // Change with what is drawn, and with what stands on it.
+    this.version = this.stock = 0;
+    this.showsObjects = true;
+    // Objects that are drawn: how many load modules have each, by its id.
+    this.ids = new Map();
     this.coarse = new Coarse(area);
     this.base = area.hasSea ? Math.min(area.height_m[0], 0) - 1 : area.height_m[0] - 20;
     this.group.add(this.coarse.group, apron(area, this.base, APRON_M));
@@ -134,7 +140,7 @@ export class Terrain {
     try {
       const modules = await readModules(this.area, part, level);
       if (this.withDem && level === 0) await readPosts(this.area, part, modules);
-      if (this.area.has_lines && level === 0) await readLines(this.area, part, modules);
+      if (this.area.has_lines) await readLines(this.area, part, modules);
       this.came.push(...modules);
       this.fault = null;
     } catch (fault) {
@@ -164,7 +170,64 @@ export class Terrain {
     if (decks) mesh.add(decks);
     const roads = module.lines ? roadMesh(this.area, module.lines, surface) : null;
     if (roads) mesh.add(roads);
-    this.drawn.set(key, { module, surface, mesh, beside, decks, roads });
+    const stands = module.objects ? this.stand(module.objects, surface) : null;
+    if (stands) mesh.add(...stands.meshes);
+    this.drawn.set(key, { module, surface, mesh, beside, decks, roads, stands });
+  }
+
+  /** Lets the objects of a load module stand on its surface. */
+  stand({ prisms, canopies, box }, surface) {
+    const blocks = new Blocks();
+    prisms.forEach((prism) => blocks.add(prism));
+    const { meshes: leaves, pieces } = canopyMeshes(canopies, box, surface);
+    const meshes = [blocks.mesh(), ...leaves].filter(Boolean);
+    meshes.forEach((each) => (each.visible = this.showsObjects));
+    for (const { id } of [...prisms, ...canopies]) this.ids.set(id, (this.ids.get(id) ?? 0) + 1);
+    this.stock += 1;
+    return { prisms, canopies, box, pieces, leaves, meshes };
+  }
+
+  /** Objects of a load module go. */
+  fell({ prisms, canopies, meshes }) {
+    meshes.forEach(({ geometry }) => geometry.dispose());
+    for (const { id } of [...prisms, ...canopies]) {
+      const left = this.ids.get(id) - 1;
+      if (left === 0) this.ids.delete(id);
+      else this.ids.set(id, left);
+    }
+    this.stock += 1;
+  }
+
+  /** Whether objects are shown. */
+  showObjects(isShown) {
+    if (isShown === this.showsObjects) return;
+    this.showsObjects = isShown;
+    [this.version, this.stock] = [this.version + 1, this.stock + 1];
+    for (const { stands } of this.drawn.values()) stands?.meshes.forEach((mesh) => (mesh.visible = isShown));
+  }
+
+  /** How many objects there are, and how many of them are drawn. */
+  counts() {
+    const all = Object.values(this.area.objects).reduce((sum, count) => sum + count, 0);
+    return { all, drawn: this.showsObjects ? this.ids.size : 0 };
+  }
+
+  /** What a vehicle meets at a place: the kind of a block within a radius that reaches from `low` to `high`, and the
+   * woods over its middle. */
+  met(east, north, radius, low, high) {
+    const found = { prism: null, woods: [] }, keys = new Set();
+    for (const [x, y] of [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      const [row, col] = this.area.moduleAt(east + radius * x, north + radius * y);
+      if (0 <= row && 0 <= col && col < this.area.cols) keys.add(row * this.area.cols + col);
+    }
+    for (const key of keys) {
+      const objects = this.drawn.get(key)?.module.objects;
+      if (!objects) continue;
+      const { prism, woods } = metAt(objects, east, north, radius, low, high);
+      found.prism ??= prism;
+      found.woods.push(...woods);
+    }
+    return found;
   }
 
   drop(key) {
@@ -175,6 +238,7 @@ export class Terrain {
     old.beside?.geometry.dispose();
     old.decks?.geometry.dispose();
     old.roads?.geometry.dispose();
+    if (old.stands) this.fell(old.stands);
     return this.drawn.delete(key);
   }
 

@@ -19,8 +19,8 @@ const STEPS = 400, STEP_M = 1;
 const HINTS = {
   sight: "click the eye, then the place it looks at", measure: "click where the line begins, then where it ends",
 };
-/** The earth that lines of sight are looked along. */
-const earth = () => (at("curved").checked ? "round" : "flat");
+/** How lines of sight are looked along. */
+const looking = () => ({ objects: at("past").value, curvature: at("curved").checked });
 /** Keys of the tools, by the ids of their buttons. */
 export const TOOL_KEYS = {
   KeyR: "sight", KeyV: "viewshed", KeyP: "measure", KeyK: "picture", KeyZ: "record", KeyL: "link",
@@ -93,14 +93,16 @@ export class Tools {
 
   async sight(from, to) {
     const [eye, target] = [Number(at("eye").value), Number(at("target").value)];
-    const found = await askSight([...from, eye], [...to, target], earth());
-    const { visible, blocker, clearance_m: clearance } = found;
-    this.marks.draw(visible ? [[found.from, found.to, FREE]]
-      : [[found.from, blocker, FREE], [blocker, found.to, HIDDEN]]);
-    const away = (place) => Math.hypot(place[0] - found.from[0], place[1] - found.from[1]).toFixed(0);
+    const found = await askSight([...from, eye], [...to, target], looking());
+    if (found.visible === null) throw new Error("the line leaves the area");
+    const { visible, blocker, ends, hidden_by: by, clearance_m: clearance, wood_m: wood, transmission } = found;
+    this.marks.draw(visible ? [[...ends, FREE]] : [[ends[0], blocker, FREE], [blocker, ends[1], HIDDEN]]);
+    const away = (place) => Math.hypot(place[0] - ends[0][0], place[1] - ends[0][1]).toFixed(0);
     this.answer = found;
-    tell(`${visible ? "visible" : `hidden, first ${away(blocker)} m from the eye`}; ${away(found.to)} m apart; `
-      + `clearance ${clearance === null ? "unknown" : `${clearance.toFixed(2)} m`}`);
+    const left = `${(100 * transmission).toFixed(0)} % of the light`;
+    const woods = wood === 0 ? "" : `; ${wood.toFixed(1)} m in woods leave ${left}`;
+    tell(`${visible ? "visible" : `hidden by ${by}, first ${away(blocker)} m from the eye`}; ${away(ends[1])} m apart; `
+      + `clearance ${clearance === null ? "unknown" : `${clearance.toFixed(2)} m`}${woods}`);
   }
 
   async measure(from, to) {
@@ -124,7 +126,7 @@ export class Tools {
     tell("looking …");
     const target = Number(at("target").value), range = 1000 * (Number(at("reach").value) || 5);
     const spacing = Math.max(SPACING_M, Math.ceil((2 * range) / (SIDE_MAX - 1)));
-    const found = await askViewshed([...place, eye], target, range, spacing, earth()), { side, seen } = found;
+    const found = await askViewshed([...place, eye], target, range, spacing, looking()), { side, seen } = found;
     const data = new Uint8Array(4 * side * side);
     seen.forEach((what, i) => {
       const [row, col] = [Math.floor(i / side), i % side], isEdge = row % (side - 1) === 0 || col % (side - 1) === 0;
@@ -141,7 +143,7 @@ export class Tools {
     at("viewshed").setAttribute("aria-pressed", true);
     this.answer = { seen: count, places: all };
     tell(`seen from ${eye.toFixed(1)} m above the ground: ${((100 * count) / all).toFixed(1)} % within `
-      + `${range / 1000} km${earth() === "round" ? " on the round earth" : ""}, `
+      + `${range / 1000} km${looking().curvature ? " on the round earth" : ""}, `
       + `${((count * spacing * spacing) / 1e6).toFixed(2)} km²`);
   }
 
