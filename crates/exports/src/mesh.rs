@@ -50,10 +50,13 @@ pub(crate) struct Part {
     pub things: Vec<(Thing, Range<usize>)>,
 }
 
+/// An object, and the triangles of its pieces.
+type Pieces = (Thing, Vec<Range<usize>>);
+
 impl Part {
     /// Each object of a part of objects with all of its pieces, over vertices of its own, by kind and number.
     pub(crate) fn by_thing(&self) -> Vec<(Thing, Self)> {
-        let mut pieces: BTreeMap<(ObjectKind, u64), (Thing, Vec<Range<usize>>)> = BTreeMap::new();
+        let mut pieces: BTreeMap<(ObjectKind, u64), Pieces> = BTreeMap::new();
         for (thing, range) in &self.things {
             let (whole, ranges) = pieces.entry((thing.kind, thing.id)).or_insert_with(|| (*thing, Vec::new()));
             whole.height = whole.height.max(thing.height);

@@ -176,22 +176,16 @@ impl Way {
             true => Some(places[at + 1]),
             false => ends.beyond(self, places[at], places[at - 1]),
         };
-        let mut rings = Vec::new();
-        for at in 0..count {
-            let turn = before(at).zip(after(at));
-            let mitre = turn.and_then(|(before, after)| mitre(before, places[at], after));
-            if mitre.is_none() {
-                rings.push(self.disc(places[at]));
-            }
-        }
+        let mitre_at = |at: usize| {
+            let (before, after) = before(at).zip(after(at))?;
+            mitre(before, places[at], after)
+        };
+        let unmitred = (0..count).filter(|&at| mitre_at(at).is_none());
+        let mut rings: Vec<Ring> = unmitred.map(|at| self.disc(places[at])).collect();
         for at in 0..count - 1 {
             let along = direction(places[at], places[at + 1]);
             let side = [-along[1], along[0]];
-            let reach = |at: usize| {
-                let turn = before(at).zip(after(at));
-                turn.and_then(|(before, after)| mitre(before, places[at], after)).unwrap_or(side)
-            };
-            let (from, to) = (reach(at), reach(at + 1));
+            let [from, to] = [at, at + 1].map(|end| mitre_at(end).unwrap_or(side));
             rings.push(vec![
                 self.beside(places[at], from, -1.0),
                 self.beside(places[at + 1], to, -1.0),
