@@ -65,8 +65,8 @@ pub struct Granted {
     pub kinds: BTreeMap<ObjectKind, [ObjectTally; 2]>,
     /// What had no room, what hides most first.
     pub left_out: Vec<Wanting>,
-    /// Woods that stay over roads, water or buildings, since they would cost more than twice as much without: a place in
-    /// each load module, metres east and north.
+    /// Woods that stay over roads, water or buildings, since they would cost more than twice as much without: a place
+    /// in each load module, metres east and north.
     pub overlaps: Vec<[f64; 2]>,
 }
 

@@ -217,7 +217,10 @@ fn objects_json(objects: &ExplainedObjects) -> Value {
         json!({ "kind": left.kind, "place_m": left.at_m, "height_m": left.height_m,
                 "silhouette_m2": left.silhouette_m2, "why": full_text(left) })
     };
-    let remark = |remark: &FeatureRemark| json!({ "object": remark.feature, "place_m": remark.at_m, "found": remark.found, "done": remark.done });
+    let remark = |of: &FeatureRemark| {
+        let FeatureRemark { feature, at_m, found, done, .. } = of;
+        json!({ "object": feature, "place_m": at_m, "found": found, "done": done })
+    };
     json!({
         "kinds": objects.kinds.iter().map(kind).collect::<Vec<_>>(),
         "limit": objects.limit,

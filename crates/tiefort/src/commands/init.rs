@@ -185,8 +185,8 @@ fn surface_model(seen: &[Seen]) -> Option<String> {
     let name_of = |seen: &&Seen| seen.path.file_name().map(|name| name.to_string_lossy().to_lowercase());
     let found = seen.iter().find(|seen| name_of(seen).is_some_and(|name| NAMES.iter().any(|of| name.contains(of))))?;
     Some(format!(
-        "{} is a surface model by its name: where roofs and crowns are in its heights, buildings and woods on top of it \
-         count twice",
+        "{} is a surface model by its name: where roofs and crowns are in its heights, buildings and woods on top of \
+         it count twice",
         found.path.display()
     ))
 }

@@ -16,6 +16,7 @@ mod facets;
 mod feature_map;
 mod features;
 mod image;
+mod light;
 mod map_extent;
 mod module_maps;
 mod objects;

@@ -4,6 +4,7 @@ use terrain::{Canopy, Corner, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, p
 
 use super::color::{Color, lit};
 use super::image::Image;
+use super::light::light_of_triangle;
 use super::map_extent::MapExtent;
 use super::scene::Scene;
 use super::sheet::Key;
@@ -85,7 +86,7 @@ fn add_canopy(canopy: &Canopy, module: &LoadModule, corner_m: [f64; 2], all: &mu
     let color = color_of(canopy.kind);
     all.extend(canopy.triangles.iter().map(|triangle| {
         let corners = triangle.map(|index| at(index, height_m));
-        Solid { corners, color: lit(color, super::facets::light_of_triangle(corners, 1.0)) }
+        Solid { corners, color: lit(color, light_of_triangle(corners, 1.0)) }
     }));
     let directed = || canopy.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
     let inner: std::collections::BTreeSet<(u16, u16)> = directed().collect();

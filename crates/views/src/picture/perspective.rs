@@ -8,8 +8,9 @@ use terrain::{Dem, metres_of_quanta};
 use super::camera::{Camera, View};
 use super::color::{Color, FEATURES, GREY, HAZE, INK, NOTHING, SKY, WATER, WHITE, lit, mix};
 use super::depth::{Corner, DepthImage};
-use super::facets::{Cover, Facets, light_of_triangle};
+use super::facets::{Cover, Facets};
 use super::image::Image;
+use super::light::light_of_triangle;
 use super::objects::Solid;
 use super::relief::{Tints, lights, range_m};
 

@@ -3,9 +3,10 @@
 use terrain::{Dem, metres_of_quanta};
 
 use super::color::{Color, FEATURES, GREY, HEIGHTS, NOTHING, WATER, lit};
-use super::facets::{Cover, Facets, light_of, light_of_triangle};
+use super::facets::{Cover, Facets};
 use super::features::{draw_lines, keys as keys_of_features, shows};
 use super::image::Image;
+use super::light::{light_of, light_of_triangle};
 use super::map_extent::{MapExtent, Posts, SAMPLES, Samples};
 use super::scene::Scene;
 use super::sheet::{Drawing, HATCH_PIXELS, Key, Legend, Sheet, round_marks};
