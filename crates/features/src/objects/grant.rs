@@ -179,7 +179,7 @@ fn canopies(
     overlaps: &mut Vec<[f64; 2]>,
 ) -> Vec<Claim> {
     /// Triangles that a wood may cost in any case.
-    const SMALL: usize = 12;
+    const SMALL: usize = 40;
     /// Metres between stems of trees, and of what is lower.
     const SPACING_M: [f64; 2] = [4.0, 2.0];
     let traits = &outline.traits;
