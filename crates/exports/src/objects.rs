@@ -1,12 +1,11 @@
 //! Surfaces of what stands on the ground: roofs and walls of prisms, tops and sides of canopies.
 
-use i_triangle::i_overlay::core::fill_rule::FillRule;
-use i_triangle::i_overlay::core::overlay::{Overlay, ShapeType};
-use i_triangle::i_overlay::core::overlay_rule::OverlayRule;
-use i_triangle::i_overlay::i_float::int::point::IntPoint;
-use i_triangle::int::triangulatable::IntTriangulatable;
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay::{Overlay, ShapeType};
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::i_float::int::point::IntPoint;
 use serde_json::{Value, json};
-use terrain::{Canopy, ModuleId, ObjectKind, Prism, metres_of_quanta};
+use terrain::{Canopy, ModuleId, ObjectKind, Prism, metres_of_quanta, plan_triangles};
 
 use crate::Product;
 use crate::drape::Draped;
@@ -146,12 +145,4 @@ pub(crate) fn united(rings: &[Vec<[i32; 2]>]) -> Vec<Vec<Vec<[i32; 2]>>> {
     let shapes = overlay.overlay(OverlayRule::Subject, FillRule::NonZero);
     let ring = |ring: Vec<IntPoint<i32>>| ring.into_iter().map(|at| [at.x, at.y]).collect();
     shapes.into_iter().map(|shape| shape.into_iter().map(ring).collect()).collect()
-}
-
-/// Places and triangles, counter-clockwise, that cover a plan of an outer ring and holes.
-fn plan_triangles(rings: &[Vec<[i32; 2]>]) -> (Vec<[i32; 2]>, Vec<[u32; 3]>) {
-    let shape: Vec<Vec<IntPoint<i32>>> =
-        rings.iter().map(|ring| ring.iter().map(|&[x, y]| IntPoint::new(x, y)).collect()).collect();
-    let made = shape.triangulate().to_triangulation::<u32>();
-    (made.points.iter().map(|at| [at.x, at.y]).collect(), made.indices.as_chunks().0.to_vec())
 }

@@ -5,12 +5,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use i_triangle::i_overlay::core::fill_rule::FillRule;
-use i_triangle::i_overlay::core::overlay::{Overlay, ShapeType};
-use i_triangle::i_overlay::core::overlay_rule::OverlayRule;
-use i_triangle::i_overlay::i_float::int::point::IntPoint;
-use i_triangle::int::triangulatable::IntTriangulatable;
-use terrain::{HOLE_CLASS, LineKind, ModuleId, ModuleLine};
+use i_overlay::core::fill_rule::FillRule;
+use i_overlay::core::overlay::{Overlay, ShapeType};
+use i_overlay::core::overlay_rule::OverlayRule;
+use i_overlay::i_float::int::point::IntPoint;
+use terrain::{HOLE_CLASS, LineKind, ModuleId, ModuleLine, plan_triangles};
 
 use crate::Product;
 use crate::drape::{Draped, Flat};
@@ -86,12 +85,10 @@ impl Ribbons {
         for ((_, class), rings) in by_class {
             let mut polygons = Vec::new();
             for shape in less(rings, &before) {
-                let made = shape.triangulate().to_triangulation::<u32>();
-                for corners in made.indices.as_chunks::<3>().0 {
-                    let corners: [Flat; 3] = corners.map(|at| {
-                        let at = made.points[at as usize];
-                        [at.x, at.y].map(f64::from)
-                    });
+                let ring = |ring: &Ring| ring.iter().map(|at| [at.x, at.y]).collect();
+                let (places, triangles) = plan_triangles(&shape.iter().map(ring).collect::<Vec<Vec<[i32; 2]>>>());
+                for corners in triangles {
+                    let corners: [Flat; 3] = corners.map(|at| places[at as usize].map(f64::from));
                     let lifted =
                         |[x, y, z]: [f64; 3]| [x.round() as i32, y.round() as i32, z.round() as i32 + RIBBON_UP];
                     let pieces = ground.under(&corners).into_iter();

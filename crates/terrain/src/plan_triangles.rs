@@ -1,6 +1,6 @@
 //! Triangles that cover a plan, for roofs and woods.
 
-use i_overlay::i_float::int::point::IntPoint;
+use i_triangle::i_overlay::i_float::int::point::IntPoint;
 use i_triangle::int::triangulatable::IntTriangulatable;
 
 /// Places and triangles, counter-clockwise, that cover a plan exactly once: its outer ring counter-clockwise, then
