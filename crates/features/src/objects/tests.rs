@@ -86,7 +86,7 @@ fn what_has_several_pieces_in_a_load_module_costs_all_of_them_there() {
     let found = object("house", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
     for (per_module, kept) in [(7, 0), (8, 1)] {
         let limits = ObjectLimits { per_module, ..LIMITS };
-        let granted = objects(vec![found.clone()], &OPTIONS, &limits, SIDE);
+        let (granted, _) = objects(vec![found.clone()], &limits);
         assert_eq!(granted.kinds[&ObjectKind::Building][0].count, kept, "{per_module}");
         assert_eq!(granted.left_out.first().map(|left| left.full), (kept == 0).then_some(grant::Full::Module([0, 1])));
     }
