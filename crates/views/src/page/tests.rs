@@ -43,6 +43,7 @@ fn limits() -> SceneLimits {
 fn page_of(name: &str, with_ground: bool) -> String {
     let (modules, limits, mut report) = (samples::modules(), limits(), samples::report());
     (report.area, report.features) = (name.into(), Some(samples::features()));
+    report.objects = Some(store::ReportObjects::default());
     let frame = GridFrame { origin_east_m: 505_000.0, origin_north_m: 3_875_000.0, spacing: samples::spacing() };
     let dem = Dem::from_fn(samples::GRID.area(), |post| Some(64_000 + post.col * 320 - post.row * 160));
     let residuals = vec![64; dem.rect().post_count()];
