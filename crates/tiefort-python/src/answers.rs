@@ -370,12 +370,7 @@ impl Ground {
     }
 
     /// What a vehicle hits at a place: word for its kind, id, metres to it, metres between stems.
-    fn obstacle(
-        &self,
-        py: Python<'_>,
-        place_m: [f64; 3],
-        radius_m: f64,
-    ) -> PyResult<Option<(&'static str, u64, f64, Option<f64>)>> {
+    fn obstacle(&self, py: Python<'_>, place_m: [f64; 3], radius_m: f64) -> PyResult<Option<Hit>> {
         let held = self.held(py)?;
         let reached = [-1.0, 1.0].map(|side| [place_m[0] + side * radius_m, place_m[1] + side * radius_m]);
         let found = py.detach(|| {
@@ -430,6 +425,8 @@ impl Ground {
     }
 }
 
+/// Word for the kind, id, metres to it, metres between stems.
+type Hit = (&'static str, u64, f64, Option<f64>);
 /// Word for the kind, id, metres of base and roof, rings on the map.
 type PrismRow = (&'static str, u64, f64, f64, Vec<Vec<[f64; 2]>>);
 /// Word for the kind, id, metres of height and between stems, fullness, triangles on the map.

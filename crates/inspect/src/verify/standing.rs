@@ -46,7 +46,7 @@ pub(crate) fn check(
     let mut pieces: BTreeMap<u64, Vec<Piece>> = BTreeMap::new();
     for (id, module) in &levels[0] {
         let granted = granted.get(id).copied().unwrap_or(&nothing);
-        if plan_of(&module.objects) != plan_of(granted) {
+        if !are_alike(&module.objects, granted) {
             problems.push(format!("load module {id}: what stands there is not what had room"));
             continue;
         }
@@ -85,9 +85,12 @@ struct Piece<'a> {
     lifted: [i32; 2],
 }
 
-/// What an object is but for heights of prisms.
-fn plan_of(objects: &Objects) -> (BTreeSet<(u64, &Vec<Vec<Corner>>)>, &Vec<terrain::Canopy>) {
-    (objects.prisms.iter().map(|prism| (prism.id, &prism.rings)).collect(), &objects.canopies)
+/// Whether objects are the same but for heights of prisms.
+fn are_alike(found: &Objects, granted: &Objects) -> bool {
+    let plans = |objects: &Objects| -> BTreeSet<(u64, Vec<Vec<Corner>>)> {
+        objects.prisms.iter().map(|prism| (prism.id, prism.rings.clone())).collect()
+    };
+    plans(found) == plans(granted) && found.canopies == granted.canopies
 }
 
 /// An edge without a wall that is no cut at a side of the load module.
