@@ -396,7 +396,7 @@ def test_buildings_and_woods_hide_and_block(tmp_path: Path) -> None:
         stems = opened.obstacle_at([507_200, 3_876_700], 3)
         assert stems is not None and stems.kind == "wood" and stems.spacing_m == 4
         assert opened.obstacle_at([506_050, 3_876_110], 3) is None
-        with pytest.raises(tiefort.RequestError, match="objects: found 'some'"):
+        with pytest.raises(tiefort.RequestError, match='objects: found "some"'):
             opened.visible(eye, behind, objects="some")
         seen = opened.viewshed((506_110, 3_876_160), 60, eye_m=2, spacing_m=5)
         on_roofs = opened.viewshed((506_110, 3_876_160), 60, eye_m=60, spacing_m=5, target_on="roof")

@@ -531,7 +531,7 @@ class Database:
         plans = [shapely.Polygon(rings[0], rings[1:]) for *_, rings in prisms]
         plans += [shapely.union_all(shapely.polygons(np.array(triangles))) for *_, triangles in canopies]
         names = ("kind", "id", "base_m", "roof_m", "height_m", "fullness", "spacing_m")
-        columns = {name: [row[place] for row in rows] for place, name in enumerate(names)}
+        columns: dict[str, Any] = {name: [row[place] for row in rows] for place, name in enumerate(names)}
         columns["id"] = np.array(columns["id"], np.uint64)
         return geopandas.GeoDataFrame(columns, geometry=plans, crs=self.crs)
 
