@@ -3,7 +3,6 @@
 use terrain::{ModuleRect, Prism, QUANTA_PER_METRE};
 
 use crate::Product;
-use crate::objects::prism_rings;
 
 /// Share of its least rectangle that an outline fills at least to be one box; else each of its walls is one.
 const FILLED_MIN: f64 = 0.8;
@@ -30,7 +29,8 @@ pub(crate) fn boxes(product: &Product, rect: ModuleRect) -> Vec<UprightBox> {
 
 fn boxes_of(prism: &Prism, corner: [i32; 2]) -> Vec<UprightBox> {
     let metres = |quanta: i32| f64::from(quanta) / f64::from(QUANTA_PER_METRE);
-    let rings: Vec<Vec<[f64; 2]>> = prism_rings(prism)
+    let rings: Vec<Vec<[f64; 2]>> = prism
+        .plan()
         .into_iter()
         .map(|ring| ring.into_iter().map(|[x, y]| [metres(corner[0] + x), metres(corner[1] + y)]).collect())
         .collect();

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use rusqlite::params;
 use source_files::geopackage_parts::{Extent, Layer, Package, point_z, polygons};
+use terrain::plans::union;
 use terrain::{Canopy, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::Product;
-use crate::objects::{canopy_shapes, prism_rings, united};
+use crate::objects::canopy_plans;
 
 const BUILDINGS: Layer = Layer {
     name: "buildings",
@@ -67,7 +68,7 @@ pub(crate) fn add_objects(
             let height = whole.height.or_else(|| Some(whole.roof? - whole.base?));
             let geometry = match layer.geometry {
                 "POINT" => point_z(package.srs, middle(product, whole)),
-                _ => polygons(package.srs, &placed(product, &united(&whole.rings))),
+                _ => polygons(package.srs, &placed(product, &union(&[whole.rings.clone()]))),
             };
             add.execute(params![
                 geometry,
@@ -100,14 +101,14 @@ fn wholes(product: &Product) -> BTreeMap<(ObjectKind, u64), Whole> {
         for prism in &module.objects.prisms {
             let &Prism { id, kind, base, roof, .. } = prism;
             let whole = wholes.entry((kind, id)).or_default();
-            whole.rings.extend(moved(product, module, prism_rings(prism)));
+            whole.rings.extend(moved(product, module, prism.plan()));
             whole.base = Some(whole.base.map_or(base, |other| other.min(base)));
             whole.roof = Some(whole.roof.map_or(roof, |other| other.max(roof)));
         }
         for canopy in &module.objects.canopies {
             let &Canopy { id, kind, height, fullness, spacing, .. } = canopy;
             let whole = wholes.entry((kind, id)).or_default();
-            whole.rings.extend(canopy_shapes(canopy).into_iter().flat_map(|shape| moved(product, module, shape)));
+            whole.rings.extend(canopy_plans(canopy).into_iter().flat_map(|plan| moved(product, module, plan)));
             whole.height = Some(height.into());
             whole.fullness = Some(f64::from(fullness) / 100.0);
             whole.spacing = Some(metres_of_quanta(spacing.into()));

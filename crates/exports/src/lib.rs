@@ -22,7 +22,6 @@ mod textures;
 pub use textures::{Texture, Textures};
 mod carries;
 pub use carries::{CARRIES, Carries, carries_table, carries_text};
-mod drape;
 mod mesh;
 mod objects;
 mod ribbons;

@@ -1,14 +1,10 @@
 //! Surfaces of what stands on the ground: roofs and walls of prisms, tops and sides of canopies.
 
-use i_overlay::core::fill_rule::FillRule;
-use i_overlay::core::overlay::{Overlay, ShapeType};
-use i_overlay::core::overlay_rule::OverlayRule;
-use i_overlay::i_float::int::point::IntPoint;
 use serde_json::{Value, json};
-use terrain::{Canopy, ModuleId, ObjectKind, Prism, metres_of_quanta, plan_triangles};
+use terrain::plans::{Plan, triangles, union};
+use terrain::{Canopy, Draped, ModuleId, ObjectKind, Prism, metres_of_quanta};
 
 use crate::Product;
-use crate::drape::Draped;
 use crate::sheets::object_material;
 
 /// An object, or the piece of one in a load module.
@@ -69,7 +65,7 @@ fn goes_on(product: &Product, id: ModuleId, [rows, cols]: [i64; 2], canopy: u64)
 /// A roof, and a wall between each two corners that have one.
 fn facets_of_prism(prism: &Prism, corner: [i32; 2]) -> Vec<Facet> {
     let place = |x: u16, y: u16, z: i32| [corner[0] + i32::from(x), corner[1] + i32::from(y), z];
-    let (places, triangles) = plan_triangles(&prism_rings(prism));
+    let (places, triangles) = triangles(&prism.plan());
     let roof = |triangle: &[u32; 3]| {
         triangle.map(|at| places[at as usize]).map(|[x, y]| [corner[0] + x, corner[1] + y, prism.roof]).to_vec()
     };
@@ -106,8 +102,8 @@ fn facets_of_canopy(
     let top = Facet { material: object_material(canopy.kind, false), polygons: top.map(lifted).collect() };
     let mut facets = vec![top];
     let side = i32::from(side);
-    for shape in canopy_shapes(canopy) {
-        for (a, b) in shape.iter().flat_map(|ring| ring.iter().copied().zip(ring.iter().copied().cycle().skip(1))) {
+    for plan in canopy_plans(canopy) {
+        for (a, b) in plan.iter().flat_map(|ring| ring.iter().copied().zip(ring.iter().copied().cycle().skip(1))) {
             let on = |axis: usize, line: i32| a[axis] == line && b[axis] == line;
             let is_cut = (on(0, 0) && goes_on(0, -1)) || (on(0, side) && goes_on(0, 1));
             if is_cut || (on(1, 0) && goes_on(-1, 0)) || (on(1, side) && goes_on(1, 0)) {
@@ -124,25 +120,8 @@ fn facets_of_canopy(
     facets
 }
 
-/// The rings of a prism in quanta from the corner of its load module.
-pub(crate) fn prism_rings(prism: &Prism) -> Vec<Vec<[i32; 2]>> {
-    prism.rings.iter().map(|ring| ring.iter().map(|at| [at.x, at.y].map(i32::from)).collect()).collect()
-}
-
-/// What the triangles of a canopy cover: shapes of an outer ring counter-clockwise and clearings clockwise.
-pub(crate) fn canopy_shapes(canopy: &Canopy) -> Vec<Vec<Vec<[i32; 2]>>> {
+/// What the triangles of a canopy cover, in quanta from the corner of its load module.
+pub(crate) fn canopy_plans(canopy: &Canopy) -> Vec<Plan> {
     let triangle = |of: &[u16; 3]| of.map(|at| canopy.places[usize::from(at)].map(i32::from)).to_vec();
-    united(&canopy.triangles.iter().map(triangle).collect::<Vec<_>>())
-}
-
-/// What rings cover together, those of holes clockwise: shapes of an outer ring and holes.
-pub(crate) fn united(rings: &[Vec<[i32; 2]>]) -> Vec<Vec<Vec<[i32; 2]>>> {
-    let mut overlay = Overlay::<i32>::new(rings.iter().map(Vec::len).sum());
-    for ring in rings {
-        let ring: Vec<IntPoint<i32>> = ring.iter().map(|&[x, y]| IntPoint::new(x, y)).collect();
-        overlay.add_contour(&ring, ShapeType::Subject);
-    }
-    let shapes = overlay.overlay(OverlayRule::Subject, FillRule::NonZero);
-    let ring = |ring: Vec<IntPoint<i32>>| ring.into_iter().map(|at| [at.x, at.y]).collect();
-    shapes.into_iter().map(|shape| shape.into_iter().map(ring).collect()).collect()
+    union(&[canopy.triangles.iter().map(triangle).collect()])
 }

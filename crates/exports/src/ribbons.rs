@@ -5,14 +5,10 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use i_overlay::core::fill_rule::FillRule;
-use i_overlay::core::overlay::{Overlay, ShapeType};
-use i_overlay::core::overlay_rule::OverlayRule;
-use i_overlay::i_float::int::point::IntPoint;
-use terrain::{HOLE_CLASS, LineKind, ModuleId, ModuleLine, plan_triangles};
+use terrain::plans::{At, Ring, difference, triangles};
+use terrain::{Draped, Flat, HOLE_CLASS, LineKind, ModuleId, ModuleLine};
 
 use crate::Product;
-use crate::drape::{Draped, Flat};
 use crate::objects::Facet;
 use crate::ribbon_lines::is_band;
 
@@ -39,8 +35,6 @@ const DISC: [Flat; 12] = {
 /// Where a way turns by more than this cosine says, its bands are not mitred but joined by a disc.
 const MITRE_COSINE_MIN: f64 = -0.3;
 
-/// A closed line in quanta.
-type Ring = Vec<IntPoint<i32>>;
 /// Travelled ways before channels, each by class: what comes first covers the others.
 type Order = (LineKind, u8);
 
@@ -84,9 +78,8 @@ impl Ribbons {
         let mut facets = Vec::new();
         for ((_, class), rings) in by_class {
             let mut polygons = Vec::new();
-            for shape in less(rings, &before) {
-                let ring = |ring: &Ring| ring.iter().map(|at| [at.x, at.y]).collect();
-                let (places, triangles) = plan_triangles(&shape.iter().map(ring).collect::<Vec<Vec<[i32; 2]>>>());
+            for plan in difference(std::slice::from_ref(rings), &[before.clone()]) {
+                let (places, triangles) = triangles(&plan);
                 for corners in triangles {
                     let corners: [Flat; 3] = corners.map(|at| places[at as usize].map(f64::from));
                     let lifted =
@@ -102,23 +95,16 @@ impl Ribbons {
     }
 }
 
-/// What rings cover together, but for what others cover.
-fn less(rings: &[Ring], others: &[Ring]) -> Vec<Vec<Ring>> {
-    let mut overlay = Overlay::<i32>::new(rings.iter().chain(others).map(Vec::len).sum());
-    rings.iter().for_each(|ring| overlay.add_contour(ring, ShapeType::Subject));
-    others.iter().for_each(|ring| overlay.add_contour(ring, ShapeType::Clip));
-    overlay.overlay(OverlayRule::Difference, FillRule::NonZero)
-}
-
 /// The load modules that a ring may reach.
 fn under(product: &Product, ring: &Ring) -> Vec<ModuleId> {
     let side = product.side();
-    let span = |of: fn(&IntPoint<i32>) -> i32, count: u32| {
-        let low = ring.iter().map(of).min().unwrap_or(0).div_euclid(side).max(0);
-        let high = ring.iter().map(of).max().unwrap_or(0).div_euclid(side).min(count as i32 - 1);
+    let span = |axis: usize, count: u32| {
+        let of = || ring.iter().map(|at| at[axis].div_euclid(side));
+        let low = of().min().unwrap_or(0).max(0);
+        let high = of().max().unwrap_or(0).min(count as i32 - 1);
         low..=high
     };
-    let (rows, cols) = (span(|at| at.y, product.rect.rows()), span(|at| at.x, product.rect.cols()));
+    let (rows, cols) = (span(1, product.rect.rows()), span(0, product.rect.cols()));
     let id =
         |row: i32, col: i32| ModuleId { row: product.rect.south + row as u32, col: product.rect.west + col as u32 };
     rows.flat_map(|row| cols.clone().map(move |col| id(row, col))).collect()
@@ -193,10 +179,9 @@ impl Way {
         rings
     }
 
-    fn beside(&self, at: [i32; 2], reach: Flat, side: f64) -> IntPoint<i32> {
+    fn beside(&self, at: [i32; 2], reach: Flat, side: f64) -> At {
         let half = side * f64::from(self.width) / 2.0;
-        let [x, y] = [0, 1].map(|axis| (f64::from(at[axis]) + half * reach[axis]).round() as i32);
-        IntPoint::new(x, y)
+        [0, 1].map(|axis| (f64::from(at[axis]) + half * reach[axis]).round() as i32)
     }
 
     fn disc(&self, at: [i32; 2]) -> Ring {

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use rusqlite::Connection;
 use schedule::Workers;
 use serde_json::Value;
-use terrain::ModuleRect;
+use terrain::{Draped, ModuleRect};
 
 use crate::{ByteRaster, Coordinates, ExportError, Mesh, Product, Put, Textures, Work, samples};
 
@@ -362,4 +362,33 @@ fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
     assert_eq!(document["images"][0]["mimeType"], "image/jpeg");
     let same = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
     assert!(tiles == same);
+}
+
+#[test]
+fn draped_pieces_cover_a_polygon_once_and_lie_on_the_ground() {
+    let ground = Draped::of(&samples::product().modules[1], [64_000, 0]);
+    let polygon = [[70_000.0, 10_000.0], [120_000.0, 12_000.0], [90_000.0, 60_000.0]];
+    let pieces = ground.under(&polygon);
+    let doubled = |ring: &[[f64; 2]]| -> f64 {
+        let next = ring.iter().cycle().skip(1);
+        ring.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum()
+    };
+    let flat = |piece: &Vec<[f64; 3]>| piece.iter().map(|&[x, y, _]| [x, y]).collect::<Vec<_>>();
+    let all: f64 = pieces.iter().map(|piece| doubled(&flat(piece))).sum();
+    assert!((all / doubled(&polygon) - 1.0).abs() < 1e-9 && pieces.len() == 4, "{pieces:?}");
+    // The lowest place of the ground, in the middle of its four triangles.
+    let lowest = pieces.iter().flatten().fold(f64::INFINITY, |low, place| low.min(place[2]));
+    assert!((lowest - 127_000.0).abs() < 1e-6, "{lowest}");
+}
+
+#[test]
+fn a_draped_edge_bends_where_the_ground_does() {
+    let ground = Draped::of(&samples::product().modules[1], [0, 0]);
+    // From the western side through the middle to the eastern one.
+    let places = ground.along([[0.0, 25_600.0], [64_000.0, 25_600.0]]);
+    let shares: Vec<[f64; 2]> = places.iter().map(|place| [place[0], place[2].round()]).collect();
+    assert_eq!(shares, [[0.0, 128_358.0], [32_000.0, 127_000.0], [64_000.0, 127_949.0]]);
+    // Along a line that triangles share, and backwards.
+    let back = ground.along([[64_000.0, 64_000.0], [0.0, 0.0]]);
+    assert_eq!((back.len() <= 4, back[0][2], back[back.len() - 1][2]), (true, 127_872.0, 128_256.0));
 }

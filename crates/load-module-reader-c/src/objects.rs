@@ -58,13 +58,7 @@ pub struct Canopy {
 
 /// `LMR_BY_GROUND` to `LMR_BY_ROW`; 0 is nothing.
 fn number_of(hider: Hider) -> u8 {
-    match hider {
-        Hider::Ground => 1,
-        Hider::Deck => 2,
-        Hider::Building => 3,
-        Hider::Wood => 4,
-        Hider::Row => 5,
-    }
+    hider as u8 + 1
 }
 
 /// Line of sight past objects; see the header.

@@ -117,6 +117,11 @@ pub struct Objects {
 pub const PRISMS_MAX: usize = 16_383;
 
 impl Prism {
+    /// Its rings without walls, east and north in quanta from the corner of the load module.
+    pub fn plan(&self) -> Vec<Vec<[i32; 2]>> {
+        self.rings.iter().map(|ring| ring.iter().map(|at| [at.x, at.y].map(i32::from)).collect()).collect()
+    }
+
     /// What it counts against a limit: its roof and each of its walls.
     pub fn polygons(&self) -> usize {
         1 + self.rings.iter().flatten().filter(|corner| corner.has_wall).count()

@@ -16,6 +16,18 @@ pub enum Standing {
     All,
 }
 
+impl Standing {
+    /// That of a word: none, buildings or all.
+    pub fn named(word: &str) -> Option<Self> {
+        match word {
+            "none" => Some(Self::None),
+            "buildings" => Some(Self::Buildings),
+            "all" => Some(Self::All),
+            _ => None,
+        }
+    }
+}
+
 /// How a line of sight takes objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PastObjects {
@@ -50,6 +62,9 @@ pub enum Hider {
 }
 
 impl Hider {
+    /// All of them, in order.
+    pub const ALL: [Self; 5] = [Self::Ground, Self::Deck, Self::Building, Self::Wood, Self::Row];
+
     /// The word for it.
     pub const fn name(self) -> &'static str {
         match self {

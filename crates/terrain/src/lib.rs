@@ -45,8 +45,8 @@ mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod class_colors;
 pub use class_colors::{FEATURE_COLORS, named_class_color};
-mod plan_triangles;
-pub use plan_triangles::plan_triangles;
+mod draped;
+pub use draped::{Draped, Flat};
 mod each;
 pub use each::{Each, gather, in_turn};
 
@@ -54,3 +54,4 @@ pub mod geometry;
 pub mod limits;
 pub mod mask;
 pub mod mesh;
+pub mod plans;

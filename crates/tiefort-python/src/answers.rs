@@ -126,23 +126,15 @@ fn runs_from_one_eye<'a>(
 
 /// Which objects a word stands for.
 fn standing(py: Python<'_>, word: &str) -> PyResult<Standing> {
-    match word {
-        "none" => Ok(Standing::None),
-        "buildings" => Ok(Standing::Buildings),
-        "all" => Ok(Standing::All),
-        _ => {
-            let message = format!("objects: found {word:?}, expected none, buildings or all");
-            Err(named(py, "RequestError", &message, "what stands on the ground and is looked at"))
-        }
-    }
+    Standing::named(word).ok_or_else(|| {
+        let message = format!("objects: found {word:?}, expected none, buildings or all");
+        named(py, "RequestError", &message, "what stands on the ground and is looked at")
+    })
 }
 
-/// What hides, by its place among these, and none behind them.
-const HIDERS: [Hider; 5] = [Hider::Ground, Hider::Deck, Hider::Building, Hider::Wood, Hider::Row];
-
+/// What hides by its place among all, and none behind them.
 fn number_of(hider: Option<Hider>) -> f64 {
-    let found = hider.and_then(|hider| HIDERS.iter().position(|other| *other == hider));
-    found.unwrap_or(HIDERS.len()) as f64
+    hider.map_or(Hider::ALL.len(), |hider| hider as usize) as f64
 }
 
 /// Heights at places: at places far apart load module by load module, since each then stays in the processor's cache.
@@ -349,7 +341,7 @@ impl Ground {
     /// The words for what hides; the last one is for nothing.
     #[staticmethod]
     fn hiders() -> Vec<&'static str> {
-        HIDERS.iter().map(|hider| hider.name()).chain([""]).collect()
+        Hider::ALL.iter().map(|hider| hider.name()).chain([""]).collect()
     }
 
     /// Heights of what lies on top at places: woods and all, or only what can be stood on.

@@ -29,12 +29,7 @@ pub fn place_above(text: &str) -> Result<[f64; 3], String> {
 
 /// Reads which objects are looked at.
 pub fn standing(text: &str) -> Result<Standing, String> {
-    match text {
-        "none" => Ok(Standing::None),
-        "buildings" => Ok(Standing::Buildings),
-        "all" => Ok(Standing::All),
-        _ => Err("expected none, buildings or all".into()),
-    }
+    Standing::named(text).ok_or_else(|| "expected none, buildings or all".into())
 }
 
 /// So many finite numbers, with commas between.

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use terrain::plans::{difference, sorted_out};
+
 use super::cut::{Piece, cut};
-use super::plan::{METRE, Plan, difference, doubled_area, sorted_out};
+use super::plan::{METRE, Plan, doubled_area};
 
 /// What is to be free of woods, by load module, in quanta from its corner.
 #[derive(Default)]

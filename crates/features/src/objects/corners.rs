@@ -1,6 +1,8 @@
 //! Fewer corners: of buildings so that right angles stay, of woods within a distance.
 
-use super::plan::{At, METRE, Plan, Ring, bounds, doubled_area, edges, length, ring_area, sorted_out};
+use terrain::plans::sorted_out;
+
+use super::plan::{At, METRE, Plan, Ring, bounds, doubled_area, edges, length, ring_area};
 
 /// Metres that a corner of a building may move at most.
 const MOVE_M_MAX: f64 = 1.0;

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use terrain::{Corner, plan_triangles};
+use terrain::Corner;
+use terrain::plans::{common, triangles};
 
-use super::plan::{At, Plan, Ring, bounds, common, edges};
+use super::plan::{At, Plan, Ring, bounds, edges};
 
 /// A plan in the square of one load module.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -129,7 +130,7 @@ pub(super) fn border(rings: &[Vec<Corner>]) -> f64 {
 pub(super) fn canopy_lists(pieces: &[Piece]) -> (Vec<[u16; 2]>, Vec<[u16; 3]>) {
     let (mut places, mut all) = (Vec::new(), Vec::new());
     for piece in pieces {
-        let (at, made) = plan_triangles(&piece.plan);
+        let (at, made) = triangles(&piece.plan);
         let first = places.len();
         let place = |at: i32| u16::try_from(at).expect("a piece lies in its square, whose sides are of 16 bits");
         places.extend(at.into_iter().map(|at| at.map(place)));

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 
 use terrain::ObjectKind;
+use terrain::plans::{common, sorted_out, union};
 
 use super::corners::{fewer, smoothed};
-use super::plan::{At, FAR, METRE, Plan, Ring, bounds, common, doubled_area, edges, length, sorted_out, union};
+use super::plan::{At, FAR, METRE, Plan, Ring, bounds, doubled_area, edges, length};
 use super::table::Traits;
 
 /// An object as a source has it.
@@ -24,6 +25,8 @@ pub struct FoundObject {
 /// Where an object is: metres east and north of the place 0, 0.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FoundShape {
+    /// A point: as wide as its kind, along the axes.
+    Point([f64; 2]),
     /// A line.
     Line(Vec<[f64; 2]>),
     /// The outer ring, then holes.
@@ -125,6 +128,12 @@ fn plans_of(shape: &FoundShape, traits: Traits, options: &ObjectOptions) -> Resu
             union(&stretches(&lattice(line).ok_or(NO_PLACE)?, traits.width, f64::MAX))
         }
         (FoundShape::Line(_), _) => return Err("a line, where a polygon is needed"),
+        (&FoundShape::Point([x, y]), ObjectKind::Tower | ObjectKind::Row) => {
+            let half = f64::from(traits.width) / METRE / 2.0;
+            let ring = [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[dx, dy]| [x + dx, y + dy]);
+            sorted_out(vec![lattice(&ring).ok_or(NO_PLACE)?])
+        }
+        (FoundShape::Point(_), _) => return Err("a point, where a polygon is needed"),
         (FoundShape::Polygon(rings), kind) if kind.is_prism() => building(rings, traits, options)?,
         (FoundShape::Polygon(rings), _) => {
             sorted_out(rings.iter().map(|ring| lattice(ring)).collect::<Option<_>>().ok_or(NO_PLACE)?)
@@ -135,6 +144,7 @@ fn plans_of(shape: &FoundShape, traits: Traits, options: &ObjectOptions) -> Resu
 
 fn first_place(shape: &FoundShape) -> Option<[f64; 2]> {
     match shape {
+        FoundShape::Point(at) => Some(*at),
         FoundShape::Line(line) => line.first().copied(),
         FoundShape::Polygon(rings) => rings.first()?.first().copied(),
     }

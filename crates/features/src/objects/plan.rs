@@ -1,71 +1,11 @@
-//! Exact operations on plans: outlines with holes, whose places are whole quanta. All of them are those of
-//! `i_overlay`, which computes in whole numbers; its results are put into one order.
+//! Measures of plans.
 
-use i_overlay::core::fill_rule::FillRule;
-use i_overlay::core::overlay::{Overlay, ShapeType};
-use i_overlay::core::overlay_rule::OverlayRule;
-use i_overlay::i_float::int::point::IntPoint;
+pub use terrain::plans::{At, Plan, Ring};
 
 /// Quanta of a metre.
 pub(super) const METRE: f64 = terrain::QUANTA_PER_METRE as f64;
-/// East and north in quanta.
-pub type At = [i32; 2];
-/// A closed line; the last place is joined to the first.
-pub type Ring = Vec<At>;
-/// The outer ring counter-clockwise, then holes clockwise.
-pub type Plan = Vec<Ring>;
-
 /// Places beyond this, either way, are not computed with: 4,194 km.
 pub(super) const FAR: i32 = 1 << 29;
-
-fn to_points(ring: &[At]) -> Vec<IntPoint<i32>> {
-    ring.iter().map(|&[x, y]| IntPoint::new(x, y)).collect()
-}
-
-fn run(subject: &[Plan], clip: &[Plan], rule: OverlayRule, fill: FillRule) -> Vec<Plan> {
-    let all = || subject.iter().chain(clip).flatten();
-    let mut overlay = Overlay::<i32>::new(all().map(Vec::len).sum());
-    for (plans, role) in [(subject, ShapeType::Subject), (clip, ShapeType::Clip)] {
-        plans.iter().flatten().for_each(|ring| overlay.add_contour(&to_points(ring), role));
-    }
-    let shapes = overlay.overlay(rule, fill);
-    let plan = |shape: Vec<Vec<IntPoint<i32>>>| -> Plan {
-        let mut rings: Plan = shape.into_iter().map(|ring| from_least(ring.iter().map(|at| [at.x, at.y]))).collect();
-        rings[1..].sort();
-        rings
-    };
-    let mut plans: Vec<Plan> = shapes.into_iter().map(plan).filter(|plan| 3 <= plan[0].len()).collect();
-    plans.sort();
-    plans
-}
-
-/// The same ring from its least place on.
-fn from_least(ring: impl Iterator<Item = At>) -> Ring {
-    let mut ring: Ring = ring.collect();
-    let least = (0..ring.len()).min_by_key(|&index| ring[index]).unwrap_or(0);
-    ring.rotate_left(least);
-    ring
-}
-
-/// What rings enclose an odd number of times: a bow tie becomes two, a hole is one whichever way it runs.
-pub(super) fn sorted_out(rings: Plan) -> Vec<Plan> {
-    run(&[rings], &[], OverlayRule::Subject, FillRule::EvenOdd)
-}
-
-/// All that any of the plans covers.
-pub(super) fn union(plans: &[Plan]) -> Vec<Plan> {
-    run(plans, &[], OverlayRule::Subject, FillRule::NonZero)
-}
-
-/// What the first cover and the others do not.
-pub(super) fn difference(subject: &[Plan], clip: &[Plan]) -> Vec<Plan> {
-    run(subject, clip, OverlayRule::Difference, FillRule::NonZero)
-}
-
-/// What both cover.
-pub(super) fn common(subject: &[Plan], clip: &[Plan]) -> Vec<Plan> {
-    run(subject, clip, OverlayRule::Intersect, FillRule::NonZero)
-}
 
 /// Twice the area, holes taken off.
 pub(super) fn doubled_area(plan: &Plan) -> i64 {

@@ -1,6 +1,7 @@
 //! What stands on the ground, in pictures: solid in views of the area, as plans on maps.
 
-use terrain::{Canopy, Corner, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, plan_triangles};
+use terrain::plans::triangles;
+use terrain::{Canopy, Corner, Draped, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE};
 
 use super::color::{Color, lit};
 use super::image::Image;
@@ -36,7 +37,10 @@ const ROOF: Color = [146, 84, 68];
 pub(crate) fn solids(module: &LoadModule, corner_m: [f64; 2]) -> Vec<Solid> {
     let mut all = Vec::new();
     module.objects.prisms.iter().for_each(|prism| add_prism(prism, corner_m, &mut all));
-    module.objects.canopies.iter().for_each(|canopy| add_canopy(canopy, module, corner_m, &mut all));
+    if !module.objects.canopies.is_empty() {
+        let ground = Draped::of(module, [0; 2]);
+        module.objects.canopies.iter().for_each(|canopy| add_canopy(canopy, &ground, corner_m, &mut all));
+    }
     all
 }
 
@@ -51,8 +55,7 @@ fn add_prism(prism: &Prism, corner_m: [f64; 2], all: &mut Vec<Solid>) {
         let [a, b] = [a, b].map(|corner| [i32::from(corner.x), i32::from(corner.y)]);
         add_wall([at(a[0], a[1], base), at(b[0], b[1], base)], [roof; 2], color_of(prism.kind), all);
     }
-    let ring = |ring: &Vec<Corner>| ring.iter().map(|corner| [corner.x, corner.y].map(i32::from)).collect();
-    let (places, triangles) = plan_triangles(&prism.rings.iter().map(ring).collect::<Vec<Vec<[i32; 2]>>>());
+    let (places, triangles) = triangles(&prism.plan());
     let color = if prism.kind == ObjectKind::Building { ROOF } else { color_of(prism.kind) };
     let place = |index: u32| at(places[index as usize][0], places[index as usize][1], roof);
     all.extend(triangles.iter().map(|triangle| Solid { corners: triangle.map(place), color }));
@@ -75,42 +78,29 @@ fn add_wall([a, b]: [[f64; 3]; 2], tops: [f64; 2], color: Color, all: &mut Vec<S
     all.push(Solid { corners: [a, top_b, top_a], color });
 }
 
-/// The top of a canopy, and its sides where it ends.
-fn add_canopy(canopy: &Canopy, module: &LoadModule, corner_m: [f64; 2], all: &mut Vec<Solid>) {
-    let ground: Vec<f64> = canopy.places.iter().map(|place| ground_under(module, *place)).collect();
+/// The top of a canopy, and its sides where it ends; both follow the ground.
+fn add_canopy(canopy: &Canopy, ground: &Draped, corner_m: [f64; 2], all: &mut Vec<Solid>) {
     let height_m = metres(canopy.height.into());
-    let at = |index: u16, up: f64| {
-        let [x, y] = canopy.places[usize::from(index)].map(i32::from).map(metres);
-        [corner_m[0] + x, corner_m[1] + y, ground[usize::from(index)] + up]
+    let at = |[x, y, z]: [f64; 3], up: f64| {
+        let [x, y, z] = [x, y, z].map(|quanta| quanta / f64::from(QUANTA_PER_METRE));
+        [corner_m[0] + x, corner_m[1] + y, z + up]
     };
+    let flat = |index: u16| canopy.places[usize::from(index)].map(f64::from);
     let color = color_of(canopy.kind);
-    all.extend(canopy.triangles.iter().map(|triangle| {
-        let corners = triangle.map(|index| at(index, height_m));
-        Solid { corners, color: lit(color, light_of_triangle(corners, 1.0)) }
-    }));
+    for piece in canopy.triangles.iter().flat_map(|triangle| ground.under(&triangle.map(flat))) {
+        all.extend((2..piece.len()).map(|last| {
+            let corners = [piece[0], piece[last - 1], piece[last]].map(|place| at(place, height_m));
+            Solid { corners, color: lit(color, light_of_triangle(corners, 1.0)) }
+        }));
+    }
     let directed = || canopy.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
     let inner: std::collections::BTreeSet<(u16, u16)> = directed().collect();
     for (a, b) in directed().filter(|(a, b)| !inner.contains(&(*b, *a))) {
-        let tops = [at(a, height_m)[2], at(b, height_m)[2]];
-        add_wall([at(a, 0.0), at(b, 0.0)], tops, lit(color, 0.8), all);
+        for pair in ground.along([flat(a), flat(b)]).windows(2) {
+            let tops = [pair[0], pair[1]].map(|place| at(place, height_m)[2]);
+            add_wall([pair[0], pair[1]].map(|place| at(place, 0.0)), tops, lit(color, 0.8), all);
+        }
     }
-}
-
-/// Height of the ground of a load module at a place in it, in metres.
-fn ground_under(module: &LoadModule, [x, y]: [u16; 2]) -> f64 {
-    let [x, y] = [f64::from(x), f64::from(y)];
-    let found = module.triangles.iter().find_map(|triangle| {
-        let [a, b, c] = triangle.map(|index| {
-            let vertex = &module.vertices[usize::from(index)];
-            [f64::from(vertex.x), f64::from(vertex.y), metres(vertex.z)]
-        });
-        let left = |p: [f64; 3], q: [f64; 3]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
-        let shares = [left(b, c), left(c, a), left(a, b)];
-        let all: f64 = shares.iter().sum();
-        let is_over = 0.0 < all && shares.iter().all(|share| 0.0 <= *share);
-        is_over.then(|| (shares[0] * a[2] + shares[1] * b[2] + shares[2] * c[2]) / all)
-    });
-    found.unwrap_or(0.0)
 }
 
 /// Draws the plans of what stands on the load modules of a scene, woods below buildings.
@@ -146,4 +136,40 @@ pub(crate) fn object_keys(scene: &Scene) -> Vec<(Key, String)> {
     let color = |kind: ObjectKind| if kind == ObjectKind::Building { ROOF } else { color_of(kind) };
     let there = ObjectKind::ALL.into_iter().filter(has);
     there.map(|kind| (Key::Filled(color(kind)), kind.name().to_owned())).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use terrain::{ModuleVertex, Objects};
+
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn a_wood_follows_the_ground_between_its_corners() {
+        let vertex = |x, y, z| ModuleVertex { x, y, z };
+        let canopy = Canopy {
+            id: 1,
+            kind: ObjectKind::Wood,
+            height: 1_280,
+            fullness: 90,
+            spacing: 512,
+            places: vec![[0, 0], [64_000, 0], [64_000, 64_000], [0, 64_000]],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        // A valley of 50 m between sides of equal height.
+        let places = [(0, 0), (32_000, 0), (64_000, 0), (64_000, 64_000), (32_000, 64_000), (0, 64_000)];
+        let vertices = places.map(|(x, y)| vertex(x, y, if x == 32_000 { 0 } else { 6_400 })).to_vec();
+        let module = LoadModule {
+            vertices,
+            triangles: vec![[0, 1, 4], [0, 4, 5], [1, 2, 3], [1, 3, 4]],
+            classes: vec![0; 4],
+            objects: Objects { canopies: vec![canopy], ..Objects::default() },
+            ..samples::modules().remove(0)
+        };
+        let made = solids(&module, [0.0, 0.0]);
+        let at_bottom: Vec<f64> =
+            made.iter().flat_map(|solid| solid.corners).filter(|at| at[0] == 250.0).map(|at| at[2]).collect();
+        assert!(!at_bottom.is_empty() && at_bottom.iter().all(|z| *z == 0.0 || *z == 10.0), "{at_bottom:?}");
+    }
 }

@@ -2,19 +2,19 @@
 
 use std::collections::BTreeSet;
 
-use terrain::LoadModule;
+use crate::LoadModule;
 
 /// A place on the plan, in quanta.
-pub(crate) type Flat = [f64; 2];
+pub type Flat = [f64; 2];
 
 /// The triangles of a load module's ground, holes closed.
-pub(crate) struct Draped {
+pub struct Draped {
     triangles: Vec<([[f64; 3]; 3], [Flat; 2])>,
 }
 
 impl Draped {
     /// Those of a load module whose south-west corner stands at `corner`.
-    pub(crate) fn of(module: &LoadModule, corner: [i32; 2]) -> Self {
+    pub fn of(module: &LoadModule, corner: [i32; 2]) -> Self {
         let place = |index: u16| {
             let vertex = &module.vertices[usize::from(index)];
             [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y), vertex.z].map(f64::from)
@@ -27,7 +27,7 @@ impl Draped {
     }
 
     /// The same without the triangles of some classes; `module` is that whose ground it is.
-    pub(crate) fn without(mut self, module: &LoadModule, classes: &BTreeSet<u8>) -> Self {
+    pub fn without(mut self, module: &LoadModule, classes: &BTreeSet<u8>) -> Self {
         let mut own = module.classes.iter();
         self.triangles.retain(|_| own.next().is_some_and(|class| !classes.contains(class)));
         self
@@ -41,7 +41,7 @@ impl Draped {
     }
 
     /// The pieces of a convex polygon, counter-clockwise, on each triangle, at the height of the ground.
-    pub(crate) fn under(&self, polygon: &[Flat]) -> Vec<Vec<[f64; 3]>> {
+    pub fn under(&self, polygon: &[Flat]) -> Vec<Vec<[f64; 3]>> {
         let pieces = self.near(polygon).map(|corners| {
             let [a, b, c] = corners.map(flat);
             let piece = clipped(&clipped(&clipped(polygon, a, b), b, c), c, a);
@@ -51,7 +51,7 @@ impl Draped {
     }
 
     /// Places along an edge at which the ground bends, its ends among them, at the height of the ground.
-    pub(crate) fn along(&self, [from, to]: [Flat; 2]) -> Vec<[f64; 3]> {
+    pub fn along(&self, [from, to]: [Flat; 2]) -> Vec<[f64; 3]> {
         let at = |share: f64| [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
         let mut spans: Vec<([f64; 2], &[[f64; 3]; 3])> =
             self.near(&[from, to]).filter_map(|corners| Some((span(corners, [from, to])?, corners))).collect();
@@ -74,7 +74,7 @@ impl Draped {
 const SHARE_MIN: f64 = 1e-9;
 
 /// East and north of a place.
-pub(crate) fn flat([x, y, _]: [f64; 3]) -> Flat {
+fn flat([x, y, _]: [f64; 3]) -> Flat {
     [x, y]
 }
 
@@ -87,12 +87,12 @@ fn bounds(places: &[Flat]) -> [Flat; 2] {
 }
 
 /// How far left of a line from `a` to `b` a place lies, times its length.
-pub(crate) fn left(a: Flat, b: Flat, at: Flat) -> f64 {
+fn left(a: Flat, b: Flat, at: Flat) -> f64 {
     (b[0] - a[0]) * (at[1] - a[1]) - (b[1] - a[1]) * (at[0] - a[0])
 }
 
 /// What of a convex polygon lies left of the line from `a` to `b`.
-pub(crate) fn clipped(polygon: &[Flat], a: Flat, b: Flat) -> Vec<Flat> {
+fn clipped(polygon: &[Flat], a: Flat, b: Flat) -> Vec<Flat> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (&p, &q) in polygon.iter().zip(polygon.iter().cycle().skip(1)) {
         let (of_p, of_q) = (left(a, b, p), left(a, b, q));
@@ -128,36 +128,4 @@ fn height(corners: &[[f64; 3]; 3], at: Flat) -> f64 {
     let [a, b, c] = corners.map(flat);
     let (of_b, of_c, all) = (left(c, a, at), left(a, b, at), left(a, b, c));
     corners[0][2] + (of_b * (corners[1][2] - corners[0][2]) + of_c * (corners[2][2] - corners[0][2])) / all
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::samples;
-
-    #[test]
-    fn pieces_cover_a_polygon_once_and_lie_on_the_ground() {
-        let module = &samples::product().modules[1];
-        let ground = Draped::of(module, [64_000, 0]);
-        let polygon = [[70_000.0, 10_000.0], [120_000.0, 12_000.0], [90_000.0, 60_000.0]];
-        let pieces = ground.under(&polygon);
-        let area = |ring: &[Flat]| -> f64 { (2..ring.len()).map(|n| left(ring[0], ring[n - 1], ring[n])).sum() };
-        let all: f64 = pieces.iter().map(|piece| area(&piece.iter().map(|&at| flat(at)).collect::<Vec<_>>())).sum();
-        assert!((all / area(&polygon) - 1.0).abs() < 1e-12 && pieces.len() == 4, "{pieces:?}");
-        // The lowest place of the ground, in the middle of its four triangles.
-        let lowest = pieces.iter().flatten().fold(f64::INFINITY, |low, place| low.min(place[2]));
-        assert!((lowest - 127_000.0).abs() < 1e-6, "{lowest}");
-    }
-
-    #[test]
-    fn an_edge_bends_where_the_ground_does() {
-        let ground = Draped::of(&samples::product().modules[1], [0, 0]);
-        // From the western side through the middle to the eastern one.
-        let places = ground.along([[0.0, 25_600.0], [64_000.0, 25_600.0]]);
-        let shares: Vec<[f64; 2]> = places.iter().map(|place| [place[0], place[2].round()]).collect();
-        assert_eq!(shares, [[0.0, 128_358.0], [32_000.0, 127_000.0], [64_000.0, 127_949.0]]);
-        // Along a line that triangles share, and backwards.
-        let back = ground.along([[64_000.0, 64_000.0], [0.0, 0.0]]);
-        assert_eq!((back.len() <= 4, back[0][2], back[back.len() - 1][2]), (true, 127_872.0, 128_256.0));
-    }
 }
