@@ -169,7 +169,7 @@ fn draw(opened: &Opened, job: &Job, report: &Report, workers: usize) -> Result<S
     let ground = if is_small { WantedGround::Job(job) } else { WantedGround::None };
     // A source may have gone meanwhile, and nothing else needs it any more.
     let product = read(ground).or_else(|_| read(WantedGround::None))?;
-    Ok(crate::product::page(&product, report))
+    Ok(crate::product::page(&product, report, workers))
 }
 
 fn state_of(run: &Run, report: &Report, tile: TileId, is_frozen: bool) -> TileState {

@@ -80,5 +80,5 @@ pub fn page(database: &Path, report: &Report, against: Option<&Path>, workers: u
         }
         found => found?,
     };
-    Ok(build::product::page(&product, report))
+    Ok(build::product::page(&product, report, workers))
 }

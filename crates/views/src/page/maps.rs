@@ -4,7 +4,9 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
+use terrain::{Each, gather};
 
+use super::Page;
 use super::marks::Marks;
 use crate::picture::{
     Drawing, GREY, Image, Key, Legend, Map, NO_RESIDUAL, NOTHING, RESIDUAL_SCALE_M, Scene, SceneGround, Shown,
@@ -97,41 +99,90 @@ fn key_style(key: Key) -> String {
     }
 }
 
-fn figures(scene: &Scene, map: Map, pixels: usize, caption: &str) -> Markup {
-    html! { @for drawing in &drawings(scene, map, pixels) { (figure(drawing, caption, &html! {})) } }
+/// A map of the page.
+#[derive(Clone, Copy)]
+pub(super) enum Figure {
+    /// The surface, with the marks that tables link to.
+    First,
+    /// Roads and water, and what became of them.
+    Features,
+    Residuals,
+    Density,
+    Limits,
+    Tiles,
 }
 
-/// The first picture of the page: the surface, with the marks that tables link to.
-pub(super) fn first(scene: &Scene, marks: &Marks) -> Markup {
-    let caption = "The compiled surface, as a simulator loads it.";
-    let drawings = drawings(scene, Map::Relief(Shown::Tin), MAP_PIXELS);
-    html! { @for drawing in &drawings { (figure(drawing, caption, &marks.over(scene))) } }
-}
+/// The maps of the page.
+pub(super) struct Figures(Vec<Markup>);
 
-/// All other maps of the page.
-pub(super) fn maps(scene: &Scene) -> Markup {
-    let per_pixel = scene.map_extent(MAP_PIXELS).metres_per_pixel();
-    // Those of load modules are known without the ground.
-    let has_residuals = scene.ground.is_some() || scene.frame.spacing.metres() < per_pixel;
-    html! {
-        @if has_residuals {
-            (figures(scene, Map::Residuals(RESIDUAL_SCALE_M), MAP_PIXELS, "How far the triangles lie from the ground."))
-        } @else {
-            p.quiet {
-                "No map of residuals: the ground was not there to be looked at. "
-                code { "tiefort report --format html --against DEM" } " draws it."
-            }
+impl Figures {
+    const ALL: [Figure; 6] =
+        [Figure::First, Figure::Features, Figure::Residuals, Figure::Density, Figure::Limits, Figure::Tiles];
+
+    /// Draws them; `each` runs one beside the other.
+    pub(super) fn of(page: &Page, scene: &Scene, marks: &Marks, each: Each) -> Self {
+        Self(gather(each, Self::ALL.len(), |number| Self::ALL[number].draw(page, scene, marks)))
+    }
+
+    pub(super) fn get(&self, figure: Figure) -> &Markup {
+        &self.0[figure as usize]
+    }
+
+    /// All but those that stand in sections of their own.
+    pub(super) fn maps(&self) -> Markup {
+        html! {
+            (self.get(Figure::Residuals))
+            (self.get(Figure::Density))
+            div.pair { (self.get(Figure::Limits)) }
+            (self.get(Figure::Tiles))
         }
-        (figures(scene, Map::Density, MAP_PIXELS, "Where the triangles went."))
-        div.pair { (figures(scene, Map::Limits, LIMITS_PIXELS, "How much of a limit is used.")) }
-        (figures(scene, Map::Tiles, MAP_PIXELS, "How the work was cut, and in which order tiles build on each other."))
     }
 }
 
-/// Roads and water, and what became of them.
-pub(super) fn features(scene: &Scene) -> Markup {
-    let caption = "Where roads and water run, what stands beside them, and where something was wrong with one.";
-    figures(scene, Map::Features, MAP_PIXELS, caption)
+impl Figure {
+    fn draw(self, page: &Page, scene: &Scene, marks: &Marks) -> Markup {
+        let none = html! {};
+        match self {
+            Self::First => {
+                let caption = "The compiled surface, as a simulator loads it.";
+                figures(scene, Map::Relief(Shown::Tin), MAP_PIXELS, caption, &marks.over(scene))
+            }
+            Self::Features if page.report.features.is_none() && page.report.objects.is_none() => none,
+            Self::Features => {
+                let caption =
+                    "Where roads and water run, what stands beside them, and where something was wrong with one.";
+                figures(scene, Map::Features, MAP_PIXELS, caption, &none)
+            }
+            Self::Residuals => {
+                let per_pixel = scene.map_extent(MAP_PIXELS).metres_per_pixel();
+                // Those of load modules are known without the ground.
+                if scene.ground.is_none() && per_pixel <= scene.frame.spacing.metres() {
+                    return without_residuals();
+                }
+                let caption = "How far the triangles lie from the ground.";
+                figures(scene, Map::Residuals(RESIDUAL_SCALE_M), MAP_PIXELS, caption, &none)
+            }
+            Self::Density => figures(scene, Map::Density, MAP_PIXELS, "Where the triangles went.", &none),
+            Self::Limits => figures(scene, Map::Limits, LIMITS_PIXELS, "How much of a limit is used.", &none),
+            Self::Tiles => {
+                let caption = "How the work was cut, and in which order tiles build on each other.";
+                figures(scene, Map::Tiles, MAP_PIXELS, caption, &none)
+            }
+        }
+    }
+}
+
+fn figures(scene: &Scene, map: Map, pixels: usize, caption: &str, over: &Markup) -> Markup {
+    html! { @for drawing in &drawings(scene, map, pixels) { (figure(drawing, caption, over)) } }
+}
+
+fn without_residuals() -> Markup {
+    html! {
+        p.quiet {
+            "No map of residuals: the ground was not there to be looked at. "
+            code { "tiefort report --format html --against DEM" } " draws it."
+        }
+    }
 }
 
 /// Wireframe and residuals of one load module.

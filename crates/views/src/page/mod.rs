@@ -13,13 +13,14 @@ pub use advice::{Advice, advise};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use store::{Manifest, Report};
-use terrain::{LoadModule, ModuleId};
+use terrain::{Each, LoadModule, ModuleId};
 
 use crate::against::leading;
 use crate::picture::{RESIDUAL_SCALE_M, Scene};
 use crate::table::grouped;
 
 use charts::Histogram;
+use maps::{Figure, Figures};
 use marks::Marks;
 
 /// One setting of a job, as the page lists it.
@@ -53,12 +54,14 @@ const VISIBLE_M: f64 = 3500.0;
 /// Load modules that are shown as the worst.
 const WORST_COUNT: usize = 10;
 
-/// The whole page.
-pub fn report_html(page: &Page) -> String {
+/// The whole page; `each` draws its maps one beside the other.
+pub fn report_html(page: &Page, each: Each) -> String {
     let Page { report, manifest, .. } = page;
     let worst_modules = page.scene.map(worst_modules).unwrap_or_default();
     let worst_ids: Vec<ModuleId> = worst_modules.iter().map(|module| module.id).collect();
     let marks = &Marks::of(report, page.scene, &worst_ids);
+    let figures = page.scene.map(|scene| Figures::of(page, scene, marks, each));
+    let figure = |figure: Figure| figures.as_ref().map(|figures| figures.get(figure));
     let title = page.title.map_or_else(|| format!("Gaming area {}", report.area), str::to_owned);
     let page = html! {
         (DOCTYPE)
@@ -74,7 +77,7 @@ pub fn report_html(page: &Page) -> String {
                 h1 { (title) }
                 p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
                 div.first[page.scene.is_some()] {
-                    @if let Some(scene) = page.scene { div { (maps::first(scene, marks)) } }
+                    @if let Some(first) = figure(Figure::First) { div { (first) } }
                     div {
                         (tables::verdict(report))
                         @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
@@ -92,18 +95,18 @@ pub fn report_html(page: &Page) -> String {
                     @if let Some(features) = &report.features {
                         section id="features" {
                             h2 { "Roads and water" } (tables::features(features))
-                            @if let Some(scene) = page.scene { (maps::features(scene)) }
+                            @if let Some(map) = figure(Figure::Features) { (map) }
                         }
                     }
                     @if let Some(objects) = &report.objects {
                         section id="objects" {
                             h2 { "Buildings and woods" } (tables::objects(objects))
-                            @if let (None, Some(scene)) = (&report.features, page.scene) { (maps::features(scene)) }
+                            @if let (None, Some(map)) = (&report.features, figure(Figure::Features)) { (map) }
                         }
                     }
-                    @match page.scene {
-                        Some(scene) => {
-                            section.whole id="maps" { h2 { "Maps" } (maps::maps(scene)) }
+                    @match page.scene.zip(figures.as_ref()) {
+                        Some((scene, figures)) => {
+                            section.whole id="maps" { h2 { "Maps" } (figures.maps()) }
                             section.whole id="worst" {
                                 h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
                             }

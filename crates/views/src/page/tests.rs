@@ -1,7 +1,7 @@
 //! The page as a whole: complete, self-contained, and safe whatever names it is given.
 
 use store::{Area, Fingerprint, Manifest, SourceRecord};
-use terrain::{Dem, GridFrame};
+use terrain::{Dem, GridFrame, in_turn};
 
 use super::*;
 use crate::picture::{SceneGround, SceneLimits};
@@ -61,24 +61,15 @@ fn page_of(name: &str, with_ground: bool) -> String {
         tiles: &[],
     };
     let settings = [PageSetting { key: "area.name".into(), value: format!("\"{name}\""), meaning: "its name".into() }];
-    report_html(&Page {
-        title: None,
-        report: &report,
-        manifest: &manifest(name),
-        settings: &settings,
-        scene: Some(&scene),
-    })
+    let (title, scene) = (None, Some(&scene));
+    report_html(&Page { title, report: &report, manifest: &manifest(name), settings: &settings, scene }, &in_turn)
 }
 
 #[test]
 fn a_page_without_maps_says_how_to_come_by_them() {
-    let page = report_html(&Page {
-        title: None,
-        report: &samples::report(),
-        manifest: &manifest("x"),
-        settings: &[],
-        scene: None,
-    });
+    let (report, manifest) = (samples::report(), manifest("x"));
+    let page =
+        report_html(&Page { title: None, report: &report, manifest: &manifest, settings: &[], scene: None }, &in_turn);
     assert!(page.contains("tiefort render DIR") && page.contains("tiefort report DIR --format html"));
     assert!(!page.contains("#worst") && !page.contains("#features"), "a link leads nowhere");
 }
@@ -149,7 +140,7 @@ fn the_picture_comes_first_and_the_title_is_that_of_the_job() {
     let (report, manifest) = (samples::report(), manifest("x"));
     let titled =
         Page { title: Some("West & <east>"), report: &report, manifest: &manifest, settings: &[], scene: None };
-    let page = report_html(&titled);
+    let page = report_html(&titled, &in_turn);
     assert!(
         page.contains("<h1>West &amp; &lt;east&gt;</h1>") && page.contains("<title>West &amp; &lt;east&gt;</title>")
     );
