@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::ground::{GamingArea, Ground};
+use features::objects::Plan;
 use features::{AreaFeatures, Formed, Kind, Levelled};
 use job::Job;
 use schedule::{Workers, for_each_piece};
@@ -96,6 +97,11 @@ impl Budgets {
         let profiles: Vec<Profile> = area.tiles.iter().map(sounded).collect::<Result<_, CompileError>>()?;
         let heard = Heard::of(&read, profiles.iter());
         Ok(Some(Self { job: job.clone(), read: Arc::new(read), heard }))
+    }
+
+    /// What ground they cover, in quanta.
+    pub(crate) fn covered(&self) -> Vec<Plan> {
+        self.read.features.covered()
     }
 
     /// What a mean and its limits would keep.

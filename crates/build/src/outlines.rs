@@ -3,9 +3,7 @@
 
 use std::sync::Arc;
 
-use features::objects::{
-    Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Outline, Plan, Wanting, granted, mended,
-};
+use features::objects::{Claims, Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Plan, Wanting, mended};
 use job::{Job, ObjectsSpec};
 use schedule::{Workers, for_each_piece};
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
@@ -14,9 +12,9 @@ use store::{
 };
 use terrain::Each;
 
+use crate::budgets::Budgets;
 use crate::ground::{FoundObjects, GamingArea};
 use crate::keys;
-use crate::read_features::ReadFeatures;
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::{CompileError, Event, Progress, Stage};
 
@@ -74,9 +72,8 @@ impl Artifact for Outlining<'_> {
 
 /// The objects of a job, on which limits are tried.
 pub struct ObjectBudgets {
-    job: Job,
-    outlines: Vec<Outline>,
-    free: Vec<Plan>,
+    limits: ObjectLimits,
+    claims: Claims,
 }
 
 /// What a limit would keep of objects.
@@ -102,36 +99,26 @@ impl ObjectBudget {
 pub const OBJECT_BUDGETS: [u32; 7] = [400, 800, 1600, 3200, 6400, 12_800, 25_600];
 
 impl ObjectBudgets {
-    /// Reads the objects of a job; `None` for a job without any.
+    /// Reads the objects of a job, which leave its features free; `None` for a job without any.
     ///
     /// # Errors
     /// When a file cannot be read, or the job is impossible.
-    pub fn open(job: &Job, workers: usize) -> Result<Option<Self>, CompileError> {
+    pub fn open(job: &Job, features: Option<&Budgets>, workers: usize) -> Result<Option<Self>, CompileError> {
         let Some(spec) = &job.objects else { return Ok(None) };
         let (workers, area) = (Workers::new(workers), GamingArea::new(job)?);
         let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
         let found = FoundObjects::read(job, spec, &area, &each)?;
-        let features = ReadFeatures::open(job, &area, &each)?;
-        let free = features.map_or_else(Vec::new, |read| read.features.covered());
-        Ok(Some(Self { job: job.clone(), outlines: mended(found.objects, &spec.options).0, free }))
-    }
-
-    /// What the job's own limits keep.
-    pub fn own(&self) -> ObjectBudget {
-        let spec = self.job.objects.as_ref().expect("a job with objects");
-        self.within(spec.per_load_module, spec.per_4km_square)
+        let free = features.map_or_else(Vec::new, Budgets::covered);
+        let (outlines, limits) = (mended(found.objects, &spec.options).0, limits_of(job, spec));
+        let claims = Claims::of(&outlines, &free, limits.size, job.modules.side_quanta.into());
+        Ok(Some(Self { limits, claims }))
     }
 
     /// What would be kept with so many polygons in a load module, and 32 times as many in a square of 4 km.
     pub fn of(&self, per_load_module: u32) -> ObjectBudget {
-        self.within(per_load_module, 32 * per_load_module)
-    }
-
-    fn within(&self, per_load_module: u32, per_window: u32) -> ObjectBudget {
-        let spec = self.job.objects.as_ref().expect("a job with objects");
-        let limits = ObjectLimits { per_module: per_load_module, per_window, ..limits_of(&self.job, spec) };
-        let Granted { kinds, .. } = granted(&self.outlines, &self.free, &limits, self.job.modules.side_quanta.into());
-        ObjectBudget { per_load_module, per_window, kinds: kinds.into_iter().map(sums_of).collect() }
+        let limits = ObjectLimits { per_module: per_load_module, per_window: 32 * per_load_module, ..self.limits };
+        let kinds = self.claims.kept(&limits).into_iter().map(sums_of).collect();
+        ObjectBudget { per_load_module, per_window: limits.per_window, kinds }
     }
 }
 
@@ -143,9 +130,9 @@ pub(crate) fn outlines_of(
     each: Each,
 ) -> Result<AreaOutlines, CompileError> {
     let FoundObjects { objects: found, remarks, notes } = FoundObjects::read(job, spec, area, each)?;
-    let side = i32::from(job.modules.side_quanta);
     let (outlines, mended) = mended(found, &spec.options);
-    let granted = granted(&outlines, free, &limits_of(job, spec), side);
+    let limits = limits_of(job, spec);
+    let granted = Claims::of(&outlines, free, limits.size, job.modules.side_quanta.into()).granted(&limits);
     Ok(AreaOutlines { notes, ..to_outlines(job, granted, mended, remarks) })
 }
 

@@ -61,7 +61,7 @@ pub fn write_mesh(mesh: &Mesh, out: &Path, on_map: bool) -> Result<(), Failure> 
 /// When it cannot be planned.
 pub fn plan(job: &Job) -> Result<String, Failure> {
     let features = build::foresee_features(job)?;
-    Ok(plan::json_text(job, &build::plan(job)?, (features.as_ref(), &budgets::of_job(job)), &[]))
+    Ok(plan::json_text(job, &build::plan(job)?, (features.as_ref(), &budgets::Tried::of_job(job)), &[]))
 }
 
 /// What `tiefort report --format json` prints.

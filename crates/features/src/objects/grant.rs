@@ -72,11 +72,25 @@ pub struct Granted {
 
 /// What is granted whole, or not at all.
 struct Claim {
-    outline: usize,
     kind: ObjectKind,
+    /// Its first corner, metres east and north.
+    at_m: [f64; 2],
+    height_m: f64,
     silhouette_m2: f64,
     /// What stands in each load module, for so many polygons.
     parts: Vec<([i32; 2], Part, u32)>,
+}
+
+impl Claim {
+    fn of(outline: &Outline, silhouette_m2: f64, part: ([i32; 2], Part, u32)) -> Self {
+        Self {
+            kind: outline.traits.kind,
+            at_m: outline.plan[0][0].map(|quanta| f64::from(quanta) / METRE),
+            height_m: f64::from(outline.traits.height) / METRE,
+            silhouette_m2,
+            parts: vec![part],
+        }
+    }
 }
 
 enum Part {
@@ -84,65 +98,88 @@ enum Part {
     Canopy(Canopy),
 }
 
-/// What has room of outlines, in load modules with a side of so many quanta that are numbered by row and column from
-/// the place 0, 0. Woods leave buildings and `free`, in quanta too, clear where that costs no more than they do.
-pub fn granted(outlines: &[Outline], free: &[Plan], limits: &ObjectLimits, side: i32) -> Granted {
-    let [rows, cols] = limits.size;
-    let solid = outlines.iter().filter(|outline| outline.traits.kind.is_prism()).map(|outline| &outline.plan);
-    let has_woods = outlines.iter().any(|outline| !outline.traits.kind.is_prism());
-    let clear = if has_woods { Clear::of(solid.chain(free), side) } else { Clear::default() };
-    let mut overlaps = Vec::new();
-    let inside = |[row, col]: [i32; 2]| 0 <= row && row < rows && 0 <= col && col < cols;
-    let mut claims = Vec::new();
-    for (number, outline) in outlines.iter().enumerate() {
-        let pieces: Vec<Piece> = cut(&outline.plan, side).into_iter().filter(|piece| inside(piece.module)).collect();
-        match outline.traits.kind.is_prism() {
-            true => claims.extend(prisms(number, outline, &pieces, side)),
-            false => claims.extend(canopies((number, outline), &pieces, &clear, side, &mut overlaps)),
-        }
-    }
-    // Outlines are sorted, so ties go by content.
-    claims.sort_by(|a, b| b.silhouette_m2.total_cmp(&a.silhouette_m2).then(a.outline.cmp(&b.outline)));
-    let mut room = Room::new(limits);
-    let mut granted = Granted { overlaps, ..Granted::default() };
-    for claim in claims {
-        let tally = granted.kinds.entry(claim.kind).or_default();
-        let add = |tally: &mut ObjectTally| {
-            tally.count += 1;
-            tally.silhouette_m2 += claim.silhouette_m2;
-        };
-        add(&mut tally[1]);
-        let costs: Vec<([i32; 2], u32)> = claim.parts.iter().map(|(module, _, cost)| (*module, *cost)).collect();
-        if let Err(full) = room.take(&costs) {
-            let outline = &outlines[claim.outline];
-            granted.left_out.push(Wanting {
-                kind: claim.kind,
-                at_m: outline.plan[0][0].map(|quanta| f64::from(quanta) / METRE),
-                height_m: f64::from(outline.traits.height) / METRE,
-                silhouette_m2: claim.silhouette_m2,
-                full,
-            });
-            continue;
-        }
-        add(&mut tally[0]);
-        for (module, part, _) in claim.parts {
-            let objects = granted.modules.entry(module).or_default();
-            match part {
-                Part::Prism(prism) => objects.prisms.push(prism),
-                Part::Canopy(canopy) => objects.canopies.push(canopy),
+/// What outlines of an area would take of limits.
+pub struct Claims {
+    /// What hides most first; ties go by content, as the order of outlines does.
+    claims: Vec<Claim>,
+    overlaps: Vec<[f64; 2]>,
+}
+
+impl Claims {
+    /// Those in load modules with a side of so many quanta, `size` of them in rows and columns from the place 0, 0.
+    /// Woods leave buildings and `free`, in quanta too, clear where that costs no more than they do.
+    pub fn of(outlines: &[Outline], free: &[Plan], size: [i32; 2], side: i32) -> Self {
+        let [rows, cols] = size;
+        let solid = outlines.iter().filter(|outline| outline.traits.kind.is_prism()).map(|outline| &outline.plan);
+        let has_woods = outlines.iter().any(|outline| !outline.traits.kind.is_prism());
+        let clear = if has_woods { Clear::of(solid.chain(free), side) } else { Clear::default() };
+        let inside = |[row, col]: [i32; 2]| 0 <= row && row < rows && 0 <= col && col < cols;
+        let (mut claims, mut overlaps) = (Vec::new(), Vec::new());
+        for outline in outlines {
+            let pieces: Vec<Piece> =
+                cut(&outline.plan, side).into_iter().filter(|piece| inside(piece.module)).collect();
+            match outline.traits.kind.is_prism() {
+                true => claims.extend(prisms(outline, &pieces, side)),
+                false => claims.extend(canopies(outline, &pieces, &clear, side, &mut overlaps)),
             }
         }
+        claims.sort_by(|a, b| b.silhouette_m2.total_cmp(&a.silhouette_m2));
+        Self { claims, overlaps }
     }
-    for objects in granted.modules.values_mut() {
-        objects.prisms.sort();
-        objects.canopies.sort();
+
+    /// By kind: what would be there within limits, and what was wanted.
+    pub fn kept(&self, limits: &ObjectLimits) -> BTreeMap<ObjectKind, [ObjectTally; 2]> {
+        let mut kinds = BTreeMap::new();
+        self.each(limits, |claim, room| tally(&mut kinds, claim, room.is_ok()));
+        kinds
     }
-    granted
+
+    /// What has room within limits.
+    pub fn granted(&self, limits: &ObjectLimits) -> Granted {
+        let mut granted = Granted { overlaps: self.overlaps.clone(), ..Granted::default() };
+        self.each(limits, |claim, room| {
+            tally(&mut granted.kinds, claim, room.is_ok());
+            if let Err(full) = room {
+                let Claim { kind, at_m, height_m, silhouette_m2, .. } = *claim;
+                granted.left_out.push(Wanting { kind, at_m, height_m, silhouette_m2, full });
+                return;
+            }
+            for (module, part, _) in &claim.parts {
+                let objects = granted.modules.entry(*module).or_default();
+                match part {
+                    Part::Prism(prism) => objects.prisms.push(prism.clone()),
+                    Part::Canopy(canopy) => objects.canopies.push(canopy.clone()),
+                }
+            }
+        });
+        for objects in granted.modules.values_mut() {
+            objects.prisms.sort();
+            objects.canopies.sort();
+        }
+        granted
+    }
+
+    /// Calls with each claim in order, and whether it has room.
+    fn each(&self, limits: &ObjectLimits, mut told: impl FnMut(&Claim, Result<(), Full>)) {
+        let mut room = Room::new(limits);
+        for claim in &self.claims {
+            let costs: Vec<([i32; 2], u32)> = claim.parts.iter().map(|(module, _, cost)| (*module, *cost)).collect();
+            told(claim, room.take(&costs));
+        }
+    }
+}
+
+fn tally(kinds: &mut BTreeMap<ObjectKind, [ObjectTally; 2]>, claim: &Claim, is_kept: bool) {
+    let [kept, wanted] = kinds.entry(claim.kind).or_default();
+    for tally in std::iter::once(wanted).chain(is_kept.then_some(kept)) {
+        tally.count += 1;
+        tally.silhouette_m2 += claim.silhouette_m2;
+    }
 }
 
 /// A building as one claim; one that is longer or wider than a load module as one for each, since its roof could not
 /// be level over so much ground.
-fn prisms(number: usize, outline: &Outline, pieces: &[Piece], side: i32) -> Vec<Claim> {
+fn prisms(outline: &Outline, pieces: &[Piece], side: i32) -> Vec<Claim> {
     let kind = outline.traits.kind;
     let across = |axis: usize| {
         let at = || pieces.iter().map(move |piece| piece.module[axis]);
@@ -164,20 +201,14 @@ fn prisms(number: usize, outline: &Outline, pieces: &[Piece], side: i32) -> Vec<
                 claim.parts.push(part);
                 claim.silhouette_m2 += silhouette_m2;
             }
-            None => claims.push(Claim { outline: number, kind, silhouette_m2, parts: vec![part] }),
+            None => claims.push(Claim::of(outline, silhouette_m2, part)),
         }
     }
     claims
 }
 
 /// A wood as a claim in each load module: it need not be level, and so much need not hang together.
-fn canopies(
-    (number, outline): (usize, &Outline),
-    pieces: &[Piece],
-    clear: &Clear,
-    side: i32,
-    overlaps: &mut Vec<[f64; 2]>,
-) -> Vec<Claim> {
+fn canopies(outline: &Outline, pieces: &[Piece], clear: &Clear, side: i32, overlaps: &mut Vec<[f64; 2]>) -> Vec<Claim> {
     /// Triangles that a wood may cost in any case.
     const SMALL: usize = 40;
     /// Metres between stems of trees, and of what is lower.
@@ -211,8 +242,7 @@ fn canopies(
             places,
             triangles,
         };
-        let parts = vec![(pieces[0].module, Part::Canopy(canopy), cost)];
-        Claim { outline: number, kind: traits.kind, silhouette_m2: traits.silhouette_m2(around), parts }
+        Claim::of(outline, traits.silhouette_m2(around), (pieces[0].module, Part::Canopy(canopy), cost))
     };
     pieces.chunk_by(|a, b| a.module == b.module).map(claim).filter(|claim| 0 < claim.parts[0].2).collect()
 }

@@ -18,16 +18,33 @@ pub fn share([kept, all]: [f64; 2]) -> String {
     }
 }
 
-/// What each budget would keep of a job with features, up to the one that keeps all; nothing of other jobs.
-pub fn of_job(job: &Job) -> Vec<Budgeted> {
-    let budgets = match Budgets::open(job, resources::cores()) {
-        Ok(Some(budgets)) => budgets,
-        Ok(None) => return Vec::new(),
-        Err(error) => {
-            terminal::tell(&format!("note: what budgets would keep of roads and water is not known: {error}"));
-            return Vec::new();
-        }
-    };
+/// What budgets would keep of a job: of features up to the one that keeps all, of objects up to the first that keeps
+/// nearly all.
+pub struct Tried {
+    /// Of features; empty where there are none.
+    pub features: Vec<Budgeted>,
+    /// Of objects; empty where there are none.
+    pub objects: Vec<ObjectBudget>,
+}
+
+impl Tried {
+    /// Those of a job.
+    pub fn of_job(job: &Job) -> Self {
+        let budgets = open(job);
+        let features = budgets.as_ref().map_or_else(Vec::new, of_features);
+        Self { features, objects: of_objects(job, budgets.as_ref()) }
+    }
+}
+
+/// The features of a job, on which budgets are tried; `None` without any, and where they cannot be read, which is told.
+pub fn open(job: &Job) -> Option<Budgets> {
+    Budgets::open(job, resources::cores()).unwrap_or_else(|error| {
+        terminal::tell(&format!("note: what budgets would keep of roads and water is not known: {error}"));
+        None
+    })
+}
+
+fn of_features(budgets: &Budgets) -> Vec<Budgeted> {
     let mut tried: Vec<Budgeted> = Vec::new();
     for mean in BUDGETS {
         tried.extend(budgets.of_mean(mean));
@@ -82,8 +99,8 @@ pub fn table_json(budgets: &[Budgeted]) -> Value {
 }
 
 /// What limits would keep of the objects of a job, up to the first that keeps nearly all.
-pub fn objects_of_job(job: &Job) -> Vec<ObjectBudget> {
-    let budgets = match ObjectBudgets::open(job, resources::cores()) {
+pub fn of_objects(job: &Job, features: Option<&Budgets>) -> Vec<ObjectBudget> {
+    let budgets = match ObjectBudgets::open(job, features, resources::cores()) {
         Ok(Some(budgets)) => budgets,
         Ok(None) => return Vec::new(),
         Err(error) => {

@@ -194,7 +194,8 @@ fn objects_text(objects: &ExplainedObjects) -> String {
         text += &format!("  left out: {}, {:.1} m high, at {east:.0} {north:.0}: ", left.kind, left.height_m);
         text += &format!("{}\n", full_text(left));
     }
-    let more = (objects.left_out.len() + objects.remarks.len()).saturating_sub(2 * REMARKS_MAX);
+    let more: usize =
+        [objects.left_out.len(), objects.remarks.len()].map(|count| count.saturating_sub(REMARKS_MAX)).iter().sum();
     if 0 < more {
         text += &format!("  and {} more in objects.geojson\n", grouped(more as u64));
     }

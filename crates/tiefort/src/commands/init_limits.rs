@@ -3,14 +3,13 @@
 use std::path::Path;
 
 use build::workbench::Suggestion;
-use build::{BUDGETS, Budgeted, Budgets, ObjectBudget, limits_of};
+use build::{BUDGETS, Budgeted, ObjectBudget, limits_of};
 use job::Job;
 use views::grouped;
 
-use crate::commands::budgets::{objects_of_job, share};
+use crate::commands::budgets::{of_objects, open, share};
 use crate::commands::init_features::kept_text;
 use crate::failure::Failure;
-use crate::{resources, terminal};
 
 /// What a person asks of the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,16 +82,10 @@ pub fn choose(asked: Asked, suggestion: &Suggestion, text: &str) -> Result<Limit
     let usual = Limits::of(mean.unwrap_or(BUDGETS[0]));
     // What cannot be opened is refused by a build, in its own words.
     let Ok(job) = Job::from_text(text, Path::new("job")) else { return Ok(usual) };
-    let objects = objects_of_job(&job);
+    let budgets = open(&job);
+    let objects = of_objects(&job, budgets.as_ref());
     let usual = Limits { said: objects_said(&objects).into_iter().collect(), objects, ..usual };
-    let budgets = match Budgets::open(&job, resources::cores()) {
-        Ok(Some(budgets)) => budgets,
-        Err(error) => {
-            terminal::tell(&format!("note: what budgets would keep of roads and water is not known: {error}"));
-            return Ok(usual);
-        }
-        Ok(None) => return Ok(usual),
-    };
+    let Some(budgets) = budgets else { return Ok(usual) };
     let mut tried = Vec::new();
     for rung in BUDGETS {
         // With so little, not even the first points fit.

@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use build::ground::PlannedTile;
-use build::{Budgeted, FeaturesForeseen, Plan, Played};
+use build::{FeaturesForeseen, Plan, Played};
 use clap::{Args, ValueEnum};
 use job::Job;
 use serde_json::{Value, json};
 use views::{Align, Table, fold, grouped};
 
 use crate::arguments::rows_by_columns;
-use crate::commands::{budgets, plan_features};
+use crate::commands::budgets::{self, Tried};
+use crate::commands::plan_features;
 use crate::engines::{self, Glue};
 use crate::failure::{Failure, Outcome};
 use crate::{costs, files, fit, run, terminal};
@@ -99,13 +100,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let played = played(&job, &plan, arguments)?;
     let glue = || Glue::new(&job, &plan, arguments.out.as_deref(), arguments.pack);
     let text = match arguments.emit {
-        Some(Emit::Json) => json_text(&job, &plan, (features.as_ref(), &budgets::of_job(&job)), &played),
+        Some(Emit::Json) => json_text(&job, &plan, (features.as_ref(), &Tried::of_job(&job)), &played),
         Some(Emit::Ninja) => engines::ninja(&glue()?),
         Some(Emit::Slurm) => engines::slurm(&glue()?),
         Some(Emit::Dask) => engines::dask(&glue()?),
         Some(Emit::Snakemake) => engines::snakemake(&glue()?),
         Some(Emit::Kubernetes) => engines::kubernetes(&glue()?)?,
-        None => fold(&plan_text(&job, &plan, (features.as_ref(), &budgets::of_job(&job)), &played), 2),
+        None => fold(&plan_text(&job, &plan, (features.as_ref(), &Tried::of_job(&job)), &played), 2),
     };
     terminal::print(&text)?;
     if !arguments.force {
@@ -137,7 +138,7 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
 fn plan_text(
     job: &Job,
     plan: &Plan,
-    (features, budgets): (Option<&FeaturesForeseen>, &[Budgeted]),
+    (features, tried): (Option<&FeaturesForeseen>, &Tried),
     played: &[Played],
 ) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
@@ -145,9 +146,9 @@ fn plan_text(
     text += &format!("\n{}", corner_table(job).text(0));
     if let Some(features) = features {
         text += &format!("\n{}", plan_features::tables_text(features, job));
-        text += &budgets::table_text(budgets);
+        text += &budgets::table_text(&tried.features);
     }
-    text += &budgets::objects_text(job, &budgets::objects_of_job(job));
+    text += &budgets::objects_text(job, &tried.objects);
     if !played.is_empty() {
         text += &format!("\n{}", played_table(played).text(0));
     }
@@ -236,7 +237,7 @@ fn by_rank(plan: &Plan) -> Vec<&PlannedTile> {
 pub fn json_text(
     job: &Job,
     plan: &Plan,
-    (features, budgets): (Option<&FeaturesForeseen>, &[Budgeted]),
+    (features, tried): (Option<&FeaturesForeseen>, &Tried),
     played: &[Played],
 ) -> String {
     let simulation: Vec<Value> = played
@@ -263,8 +264,8 @@ pub fn json_text(
                       "worker_bytes": forecast.worker_bytes, "seconds": forecast.seconds,
                       "disk_bytes": forecast.disk_bytes },
         "features": features.map(plan_features::tables_json),
-        "budgets": budgets::table_json(budgets),
-        "objects": budgets::objects_json(&budgets::objects_of_job(job)),
+        "budgets": budgets::table_json(&tried.features),
+        "objects": budgets::objects_json(&tried.objects),
         "simulation": simulation,
         "tiles": tiles,
     });
