@@ -6,7 +6,7 @@ use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorShape, Wanted, read
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: true };
+    let wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: true, points: true };
     let Ok(file) = read_features(&tiefort_fuzz::file("vectors", bytes), &wanted, &terrain::in_turn) else { return };
     check(&file);
 });

@@ -17,6 +17,8 @@ const NO_DATA: f64 = -1.0e38;
 pub(crate) enum Shape {
     /// A record may be empty.
     Nothing,
+    /// Places; their heights are not read.
+    Points(Vec<[f64; 3]>),
     Lines {
         lines: Vec<Vec<[f64; 3]>>,
         has_heights: bool,
@@ -54,6 +56,7 @@ pub(crate) fn rings(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result
                 let flat = |ring: Vec<[f64; 3]>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
                 polygons.push(rings.into_iter().map(flat).collect());
             }
+            Shape::Points(_) => return refused("Point"),
             Shape::Lines { .. } => return refused("PolyLine"),
             Shape::Other(found) => return refused(found),
         }
@@ -70,8 +73,11 @@ fn shape(store: &Store, bytes: &[u8], at: usize) -> Result<Shape, SourceError> {
         0 => Shape::Nothing,
         3 | 13 | 23 => Shape::Lines { lines: runs(store, record, has_heights)?, has_heights },
         5 | 15 | 25 => Shape::Rings { rings: runs(store, record, has_heights)?, has_heights },
-        1 | 11 | 21 => Shape::Other("Point"),
-        8 | 18 | 28 => Shape::Other("MultiPoint"),
+        1 | 11 | 21 => Shape::Points(places(part(store, record, 4, 16)?).collect()),
+        8 | 18 | 28 => {
+            let count = whole(store, record, 36)? as usize;
+            Shape::Points(places(part(store, record, 40, count.saturating_mul(16))?).collect())
+        }
         _ => Shape::Other("shape of some other kind"),
     })
 }
@@ -108,6 +114,15 @@ fn big(bytes: &[u8]) -> usize {
     bytes.iter().fold(0, |number, &byte| number << 8 | usize::from(byte))
 }
 
+fn number(bytes: &[u8]) -> f64 {
+    f64::from_le_bytes(bytes.try_into().expect("eight bytes were cut"))
+}
+
+/// Places without heights.
+fn places(bytes: &[u8]) -> impl Iterator<Item = [f64; 3]> {
+    bytes.chunks_exact(16).map(|xy| [number(&xy[..8]), number(&xy[8..]), f64::NAN])
+}
+
 fn runs(store: &Store, record: &[u8], has_heights: bool) -> Result<Vec<Vec<[f64; 3]>>, SourceError> {
     let (parts, points) = (whole(store, record, 36)? as usize, whole(store, record, 40)? as usize);
     let starts = part(store, record, 44, parts.saturating_mul(4))?;
@@ -116,13 +131,11 @@ fn runs(store: &Store, record: &[u8], has_heights: bool) -> Result<Vec<Vec<[f64;
         return Err(store.malformed("a record", format!("{parts} parts of {points} points"), "parts with points"));
     }
     let places_at = 44 + starts.len();
-    let places = part(store, record, places_at, points.saturating_mul(16))?;
-    let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().expect("eight bytes were cut"));
-    let mut vertices: Vec<[f64; 3]> =
-        places.chunks_exact(16).map(|xy| [number(&xy[..8]), number(&xy[8..]), f64::NAN]).collect();
+    let flat = part(store, record, places_at, points.saturating_mul(16))?;
+    let mut vertices: Vec<[f64; 3]> = places(flat).collect();
     if has_heights {
         // Their range goes before them.
-        let heights = part(store, record, places_at + places.len() + 16, points.saturating_mul(8))?;
+        let heights = part(store, record, places_at + flat.len() + 16, points.saturating_mul(8))?;
         let given = heights.chunks_exact(8).map(number);
         for (vertex, height) in vertices.iter_mut().zip(given) {
             vertex[2] = if height < NO_DATA { f64::NAN } else { height };

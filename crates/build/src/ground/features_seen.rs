@@ -118,7 +118,7 @@ pub fn features_in(
     let mut keys = [&BUILT_IN_KEYS[..], &OBJECT_KEYS].concat();
     keys.sort_unstable();
     keys.dedup();
-    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &keys, buildings: false };
+    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &keys, buildings: false, points: false };
     let read = read_features(path, &wanted, &in_turn)?;
     let is_polygon = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Polygon(_));
     let first = read.features.first().map(is_polygon);

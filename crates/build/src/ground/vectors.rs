@@ -119,6 +119,7 @@ impl Vectors {
             crs: crs.as_ref(),
             keys: &keys,
             buildings: spec.buildings,
+            points: false,
         };
         let FeatureFile { features, buildings, remarks, notes, found, outside, .. } =
             source_files::read_features(&file.path, &wanted, each)?;
@@ -139,6 +140,8 @@ impl Vectors {
                 places.map(|(at, place)| position(*place, height(at), &area.frame)).collect()
             };
             let shape = match &shape {
+                // No feature is one.
+                VectorShape::Point(_) => continue,
                 VectorShape::Line(vertices) => Shape::Line(line(vertices)),
                 VectorShape::Polygon(rings) => Shape::Polygon(rings.iter().map(line).collect()),
             };

@@ -56,9 +56,9 @@ const STEP: i32 = 16;
 /// Metres within which the border of a wood stays.
 const WOOD_WITHIN_M: f64 = 2.0;
 /// Square metres of the least clearing and the least wood.
-const WOOD_M2_MIN: f64 = 400.0;
+pub(super) const WOOD_M2_MIN: f64 = 400.0;
 /// Metres of a class of heights: woods of one class are united.
-const CLASS_M: f64 = 3.0;
+pub(super) const CLASS_M: f64 = 3.0;
 /// Metres of a stretch of wall, which has one roof.
 const WALL_M_MAX: f64 = 25.0;
 /// Why an object with a place that is no number, or is far away, is left out.

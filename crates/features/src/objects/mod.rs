@@ -3,12 +3,14 @@
 //! ```text
 //! traits(tags, kind, rules) -> Traits          what it is, how high, how dense
 //! mended(found, options) -> Vec<Outline>       on the lattice, without flaws, few corners; woods united
-//! granted(outlines, free, limits) -> Granted   woods leave roads free; what hides least is left out without room
+//! Claims::of(outlines, free, ..)               cut at load-module lines; woods leave roads free
+//!     .granted(limits) -> Granted              what hides least is left out without room
 //! ```
 //!
 //! Heights are above the ground, which is not known here: the roof of a prism is that of its highest ground plus
 //! `roof`, and one with a `base` above 0 hangs in the air. Nothing depends on the order in which objects come.
 
+mod canopy;
 mod clear;
 mod corners;
 mod cut;
@@ -17,7 +19,8 @@ mod mend;
 mod plan;
 mod table;
 
-pub use grant::{Full, Granted, ObjectLimits, ObjectTally, Wanting, granted};
+pub use canopy::{CanopyRun, canopy_class, canopy_woods};
+pub use grant::{Claims, Full, Granted, ObjectLimits, ObjectTally, Wanting};
 pub use mend::{FoundObject, FoundShape, ObjectOptions, ObjectRemark, Outline, mended, strips};
 pub use plan::Plan;
 pub use table::{OBJECT_KEYS, ObjectRule, Traits, traits};

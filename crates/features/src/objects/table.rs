@@ -40,18 +40,22 @@ const BUILDINGS: [(&str, f64); 22] = [
     ("warehouse", 9.0),
 ];
 const BUILDING_M: f64 = 6.0;
-/// The same by the value of `man_made`; no other value is a tower.
-const TOWERS: [(&str, f64); 9] = [
-    ("chimney", 40.0),
-    ("communications_tower", 80.0),
-    ("cooling_tower", 80.0),
-    ("gasometer", 20.0),
-    ("mast", 30.0),
-    ("silo", 18.0),
-    ("storage_tank", 10.0),
-    ("tower", 30.0),
-    ("water_tower", 30.0),
+/// Heights by the value of `man_made`, and widths of what is a point; no other value is a tower.
+const TOWERS: [(&str, f64, f64); 9] = [
+    ("chimney", 40.0, 4.0),
+    ("communications_tower", 80.0, 8.0),
+    ("cooling_tower", 80.0, 50.0),
+    ("gasometer", 20.0, 30.0),
+    ("mast", 30.0, 1.0),
+    ("silo", 18.0, 6.0),
+    ("storage_tank", 10.0, 12.0),
+    ("tower", 30.0, 6.0),
+    ("water_tower", 30.0, 8.0),
 ];
+/// The same of what carries the wires of a power line: it is open, so it hides as little as a thin mast.
+const PYLON_M: [f64; 2] = [30.0, 1.0];
+/// Height and crown of a tree that stands alone.
+const TREE_M: [f64; 2] = [10.0, 6.0];
 
 /// What an object is, in quanta where a name does not say otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,14 +68,14 @@ pub struct Traits {
     pub bottom: i32,
     /// From the highest ground under it to its roof, or from the ground to the top of a canopy.
     pub height: i32,
-    /// Of a line.
+    /// Of a line, or a point.
     pub width: i32,
     /// Per cent of the light that 10 m of a canopy take away; 100 of what is none.
     pub fullness: u8,
 }
 
 /// Keys of OpenStreetMap by which the table tells what an object is.
-pub const OBJECT_KEYS: [&str; 6] = ["building", "building:part", "landuse", "natural", "barrier", "man_made"];
+pub const OBJECT_KEYS: [&str; 7] = ["building", "building:part", "landuse", "natural", "barrier", "man_made", "power"];
 
 /// What a job says of objects with certain tags.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,7 +106,7 @@ pub fn traits<'a>(
 ) -> Option<(Traits, Vec<(String, String)>)> {
     let rule = rules.iter().find(|rule| rule.takes(&tag));
     let said = rule.and_then(|rule| rule.kind);
-    let (kind, usual_m) = kind_of(&tag);
+    let (kind, [usual_m, usual_width_m]) = kind_of(&tag);
     let kind = match said {
         Some(kind) => kind?,
         None => source.0.or(kind)?,
@@ -136,7 +140,7 @@ pub fn traits<'a>(
         is_part: tag("building:part").is_some_and(is_yes),
         bottom: quanta(bottom_m),
         height: quanta(height_m).max(1),
-        width: quanta(width_m.unwrap_or_else(|| width_m_of(kind, height_m))),
+        width: quanta(width_m.or(usual_width_m).unwrap_or_else(|| width_m_of(kind, height_m))),
         fullness: fullness_of(kind, height_m),
     };
     Some((traits, bad))
@@ -146,26 +150,30 @@ fn is_yes(value: &str) -> bool {
     !matches!(value.trim(), "" | "no")
 }
 
-/// The kind that the table gives, and the usual height where it depends on more than the kind.
-fn kind_of<'a>(tag: &impl Fn(&str) -> Option<&'a str>) -> (Option<ObjectKind>, Option<f64>) {
-    let listed = |table: &[(&str, f64)], value: &str| table.iter().find(|(name, _)| *name == value).map(|(_, m)| *m);
+/// The kind that the table gives, and the usual height and width where they depend on more than the kind.
+fn kind_of<'a>(tag: &impl Fn(&str) -> Option<&'a str>) -> (Option<ObjectKind>, [Option<f64>; 2]) {
     if let Some(value) = tag("building:part").or_else(|| tag("building")).filter(|value| is_yes(value)) {
-        return (Some(ObjectKind::Building), listed(&BUILDINGS, value));
+        let usual_m = BUILDINGS.iter().find(|(name, _)| *name == value).map(|(_, usual_m)| *usual_m);
+        return (Some(ObjectKind::Building), [usual_m, None]);
     }
-    if let Some(usual_m) = tag("man_made").and_then(|value| listed(&TOWERS, value)) {
-        return (Some(ObjectKind::Tower), Some(usual_m));
+    let tower = tag("man_made").and_then(|value| TOWERS.iter().find(|(name, ..)| *name == value));
+    if let Some((_, height_m, width_m)) = tower {
+        return (Some(ObjectKind::Tower), [*height_m, *width_m].map(Some));
     }
-    match (tag("landuse"), tag("natural"), tag("barrier")) {
-        (Some("forest"), ..) | (_, Some("wood"), _) => (Some(ObjectKind::Wood), None),
-        (_, Some("scrub"), _) => (Some(ObjectKind::Scrub), None),
-        (Some("orchard"), ..) => (Some(ObjectKind::Orchard), None),
-        (Some("vineyard"), ..) => (Some(ObjectKind::Orchard), Some(2.0)),
-        (_, Some("tree_row"), _) => (Some(ObjectKind::Row), Some(12.0)),
-        (.., Some("hedge")) => (Some(ObjectKind::Row), None),
-        (.., Some("wall")) => (Some(ObjectKind::Wall), None),
-        (.., Some("city_wall")) => (Some(ObjectKind::Wall), Some(8.0)),
-        _ => (None, None),
-    }
+    let (kind, height_m) = match (tag("landuse"), tag("natural"), tag("barrier"), tag("power")) {
+        (Some("forest"), ..) | (_, Some("wood"), ..) => (ObjectKind::Wood, None),
+        (_, Some("scrub"), ..) => (ObjectKind::Scrub, None),
+        (Some("orchard"), ..) => (ObjectKind::Orchard, None),
+        (Some("vineyard"), ..) => (ObjectKind::Orchard, Some(2.0)),
+        (_, Some("tree_row"), ..) => (ObjectKind::Row, Some(12.0)),
+        (_, Some("tree"), ..) => return (Some(ObjectKind::Row), TREE_M.map(Some)),
+        (.., Some("hedge"), _) => (ObjectKind::Row, None),
+        (.., Some("wall"), _) => (ObjectKind::Wall, None),
+        (.., Some("city_wall"), _) => (ObjectKind::Wall, Some(8.0)),
+        (.., Some("tower")) => return (Some(ObjectKind::Tower), PYLON_M.map(Some)),
+        _ => return (None, [None; 2]),
+    };
+    (Some(kind), [height_m, None])
 }
 
 fn usual_m_of(kind: ObjectKind) -> f64 {
@@ -186,6 +194,7 @@ fn width_m_of(kind: ObjectKind, height_m: f64) -> f64 {
     match kind {
         ObjectKind::Row if HEDGE_M_MAX < height_m => 6.0,
         ObjectKind::Row => 2.0,
+        ObjectKind::Tower => 6.0,
         _ => 0.5,
     }
 }
@@ -232,6 +241,9 @@ mod tests {
         check(&[("natural", "tree_row")], Some((Row, 0.0, 12.0, 0)));
         check(&[("barrier", "fence")], None);
         check(&[("barrier", "city_wall")], Some((Wall, 0.0, 8.0, 0)));
+        check(&[("natural", "tree")], Some((Row, 0.0, 10.0, 0)));
+        check(&[("power", "tower"), ("height", "52")], Some((Tower, 0.0, 52.0, 0)));
+        check(&[("power", "line")], None);
     }
 
     #[test]

@@ -30,7 +30,7 @@ fn made(found: Vec<FoundObject>) -> (Granted, Vec<ObjectRemark>) {
 
 fn objects(found: Vec<FoundObject>, limits: &ObjectLimits) -> (Granted, Vec<ObjectRemark>) {
     let (outlines, remarks) = mended(found, &OPTIONS);
-    (granted(&outlines, &[], limits, SIDE), remarks)
+    (Claims::of(&outlines, &[], limits.size, SIDE).granted(limits), remarks)
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn woods_leave_roads_and_buildings_free() {
     let quanta = |[x, y]: [f64; 2]| [x, y].map(|metres| (metres * METRE) as i32);
     let road = strips(&[[50.0, 150.0], [250.0, 150.0], [450.0, 200.0]].map(quanta), 8 * 128);
     let area = |free: &[Plan]| {
-        let granted = granted(&outlines, free, &LIMITS, SIDE);
+        let granted = Claims::of(&outlines, free, LIMITS.size, SIDE).granted(&LIMITS);
         assert!(granted.overlaps.is_empty());
         area_m2(&granted.modules[&[0, 0]].canopies[0])
     };
@@ -184,6 +184,21 @@ fn woods_leave_roads_and_buildings_free() {
     // As many roads as would cost more than the wood.
     let many: Vec<Plan> =
         (0..40).flat_map(|k| strips(&[[90.0 + 8.0 * f64::from(k), 90.0], [98.0, 410.0]].map(quanta), 128)).collect();
-    let crossed = granted(&outlines, &many, &LIMITS, SIDE);
+    let crossed = Claims::of(&outlines, &many, LIMITS.size, SIDE).granted(&LIMITS);
     assert_eq!((crossed.overlaps.len(), crossed.modules[&[0, 0]].canopies[0].triangles.len()), (1, 2));
+}
+
+#[test]
+fn points_are_as_wide_as_what_stands_there() {
+    let at = FoundShape::Point([100.0, 100.0]);
+    let mast = object("mast", &[("man_made", "mast")], at.clone());
+    let tree = object("tree", &[("natural", "tree"), ("height", "8")], at.clone());
+    let (granted, remarks) = made(vec![mast, tree, object("house", &[("building", "yes")], at)]);
+    let objects = &granted.modules[&[0, 0]];
+    let around: Vec<[u16; 2]> = objects.prisms[0].rings[0].iter().map(|corner| [corner.x, corner.y]).collect();
+    assert_eq!((around.len(), around.iter().min(), around.iter().max()), (4, Some(&[12_736; 2]), Some(&[12_864; 2])));
+    // Leaves leave the mast free.
+    assert_eq!((area_m2(&objects.canopies[0]), objects.canopies[0].height), (35.0, 1_024));
+    let found: Vec<&str> = remarks.iter().map(|remark| remark.found.as_str()).collect();
+    assert_eq!(found, ["a point, where a polygon is needed"]);
 }

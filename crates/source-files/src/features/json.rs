@@ -96,14 +96,19 @@ fn add(geometry: Geometry, shape: &mut RawShape) {
         GeometryValue::GeometryCollection { geometries } => {
             geometries.into_iter().for_each(|geometry| add(geometry, shape));
         }
-        GeometryValue::Point { .. } => shape.other = Some("Point"),
-        GeometryValue::MultiPoint { .. } => shape.other = Some("MultiPoint"),
+        GeometryValue::Point { coordinates } => add_points(&[coordinates], shape),
+        GeometryValue::MultiPoint { coordinates } => add_points(&coordinates, shape),
     }
 }
 
 fn add_line(positions: &[Position], shape: &mut RawShape) {
     let line = vertices(positions, shape);
     shape.parts.push(Part::Line(line));
+}
+
+fn add_points(positions: &[Position], shape: &mut RawShape) {
+    let points = vertices(positions, shape);
+    shape.parts.extend(points.into_iter().map(Part::Point));
 }
 
 fn add_polygon(rings: &[Vec<Position>], shape: &mut RawShape) {

@@ -32,6 +32,8 @@ pub struct Wanted<'a> {
     pub keys: &'a [&'a str],
     /// Whether buildings are read, too, apart from the features.
     pub buildings: bool,
+    /// Whether points are features, too; else they are left out and told.
+    pub points: bool,
 }
 
 impl Wanted<'_> {
@@ -47,7 +49,7 @@ impl Wanted<'_> {
 /// Attributes, sorted by key. Texts that are the same are kept once.
 pub type Tags = Vec<(Arc<str>, Arc<str>)>;
 
-/// A line or polygon of a file.
+/// A line or polygon of a file, or a point where points are wanted.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VectorFeature {
     /// Its name for people: `way/123`, `relation/5`, `roads.geojson#17`, `hydro.gpkg:rivers#3`. Where a feature has
@@ -70,6 +72,8 @@ impl VectorFeature {
 /// Where a feature lies.
 #[derive(Clone, Debug, PartialEq)]
 pub enum VectorShape {
+    /// Easting and northing in metres of the area's system.
+    Point([f64; 2]),
     /// At least two vertices, as digitised.
     Line(Vertices),
     /// The outer ring, then the holes. Rings are closed: the last vertex is the first.

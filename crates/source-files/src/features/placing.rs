@@ -66,6 +66,8 @@ pub(super) struct Placing {
     /// Where the features of the file lie, in its coordinates.
     lies: Extent,
     height_unit_m: f64,
+    /// Whether points are placed.
+    points: bool,
     remarks_beyond: u64,
     /// Of the whole file, whose parts share it.
     allowance: Arc<Allowance>,
@@ -91,6 +93,7 @@ impl Placing {
             near,
             lies: Extent::NOTHING,
             height_unit_m,
+            points: wanted.points,
             remarks_beyond: 0,
             allowance: Arc::new(Allowance::new(path, file_bytes)),
             file,
@@ -177,7 +180,14 @@ impl Placing {
         if self.allowance.is_spent() {
             return;
         }
-        let RawFeature { id, tags, shape } = feature;
+        let RawFeature { id, tags, mut shape } = feature;
+        if !self.points {
+            let all = shape.parts.len();
+            shape.parts.retain(|part| !matches!(part, Part::Point(_)));
+            if shape.parts.len() < all {
+                shape.other = shape.other.or(Some("Point"));
+            }
+        }
         if let Some(other) = shape.other {
             let done = if shape.parts.is_empty() { "left out" } else { "left out, its lines and polygons kept" };
             let found = format!("a {other}, where lines and polygons are read");
@@ -221,9 +231,10 @@ impl Placing {
 
     /// A part that has enough vertices, its rings closed.
     fn sound(&mut self, id: &str, part: Part) -> Option<Part> {
-        let first = part.runs().iter().flatten().next().copied();
+        let first = part.runs().flatten().next().copied();
         let at = |placing: &Self| first.and_then(|vertex| placing.at(&vertex));
         match part {
+            Part::Point(_) => Some(part),
             Part::Line(line) if line.len() < 2 => {
                 let at = at(self);
                 self.remark(id, at, format!("a line of {}", counted(line.len())), LEFT_OUT);
@@ -281,6 +292,11 @@ impl Placing {
     /// What of a part lies inside the bounds; `None` where it cannot be projected.
     fn part(&self, part: Part) -> Option<Vec<Part>> {
         match part {
+            Part::Point(vertex) => {
+                let placed = if self.is_same { vertex } else { self.one_projected(vertex)? };
+                let is_inside = self.bounds.holds([placed[0], placed[1]]);
+                Some(is_inside.then_some(Part::Point(placed)).into_iter().collect())
+            }
             Part::Line(line) => {
                 let mut pieces = Vec::new();
                 for piece in clip::line(line, &self.near) {
@@ -346,7 +362,7 @@ impl Placing {
     }
 
     fn keep(&mut self, id: String, tags: Tags, mut parts: Vec<Part>, unit_m: Option<f64>) {
-        let vertices: usize = parts.iter().flat_map(Part::runs).map(Vec::len).sum();
+        let vertices: usize = parts.iter().flat_map(Part::runs).map(<[Vertex]>::len).sum();
         // Each part has tags of its own.
         self.allowance.count(parts.len() * (128 + 32 * tags.len()) + vertices * VERTEX_BYTES);
         let vertices = |run: Vec<Vertex>| Vertices {
@@ -354,6 +370,7 @@ impl Placing {
             places: run.into_iter().map(|[east, north, _]| [east, north]).collect(),
         };
         let shape = |part: Part| match part {
+            Part::Point([east, north, _]) => VectorShape::Point([east, north]),
             Part::Line(line) => VectorShape::Line(vertices(line)),
             Part::Polygon(rings) => VectorShape::Polygon(rings.into_iter().map(vertices).collect()),
         };
@@ -414,11 +431,11 @@ const PLACE_MAX: f64 = 4.0e8;
 
 impl Part {
     fn turn(&mut self, by: f64) {
-        let runs = match self {
-            Part::Line(line) => std::slice::from_mut(line),
-            Part::Polygon(rings) => rings,
-        };
-        runs.iter_mut().flatten().for_each(|vertex| vertex[0] += by);
+        match self {
+            Part::Point(vertex) => vertex[0] += by,
+            Part::Line(line) => line.iter_mut().for_each(|vertex| vertex[0] += by),
+            Part::Polygon(rings) => rings.iter_mut().flatten().for_each(|vertex| vertex[0] += by),
+        }
     }
 }
 

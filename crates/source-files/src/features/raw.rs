@@ -17,23 +17,27 @@ pub(crate) struct RawShape {
     /// Whether the file gives heights. Those that it does not give are NaN.
     pub has_heights: bool,
     pub parts: Vec<Part>,
-    /// Something in it that is neither a line nor a polygon.
+    /// Something in it that is neither a point, a line nor a polygon.
     pub other: Option<&'static str>,
 }
 
-/// A line, or a polygon: its outer ring, then its holes.
+/// A point, a line, or a polygon: its outer ring, then its holes.
 #[derive(Debug)]
 pub(crate) enum Part {
+    Point(Vertex),
     Line(Vec<Vertex>),
     Polygon(Vec<Vec<Vertex>>),
 }
 
 impl Part {
-    pub(super) fn runs(&self) -> &[Vec<Vertex>] {
-        match self {
-            Part::Line(line) => std::slice::from_ref(line),
-            Part::Polygon(rings) => rings,
-        }
+    /// Its vertices, ring by ring.
+    pub(super) fn runs(&self) -> impl Iterator<Item = &[Vertex]> + Clone {
+        let (single, rings) = match self {
+            Part::Point(vertex) => (Some(std::slice::from_ref(vertex)), &[][..]),
+            Part::Line(line) => (Some(line.as_slice()), &[][..]),
+            Part::Polygon(rings) => (None, rings.as_slice()),
+        };
+        single.into_iter().chain(rings.iter().map(Vec::as_slice))
     }
 }
 

@@ -62,8 +62,12 @@ fn table_of(parts: &Parts) -> Result<Option<Table>, SourceError> {
 fn looks(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result<bool, SourceError> {
     let mut vertices: Vec<Vertex> = Vec::new();
     for shape in shapefile::shapes(store, bytes, index)?.take(1000) {
-        if let Shape::Lines { lines: runs, .. } | Shape::Rings { rings: runs, .. } = shape? {
-            vertices.extend(runs.into_iter().flatten());
+        match shape? {
+            Shape::Lines { lines: runs, .. } | Shape::Rings { rings: runs, .. } => {
+                vertices.extend(runs.into_iter().flatten());
+            }
+            Shape::Points(points) => vertices.extend(points),
+            Shape::Nothing | Shape::Other(_) => {}
         }
     }
     Ok(look_like_degrees(vertices.iter()))
@@ -74,6 +78,7 @@ fn raw(shape: Shape) -> Result<RawShape, usize> {
     let (parts, has_heights, other) = match shape {
         Shape::Nothing => (Vec::new(), false, None),
         Shape::Other(other) => (Vec::new(), false, Some(other)),
+        Shape::Points(points) => (points.into_iter().map(Part::Point).collect(), false, None),
         Shape::Lines { lines, has_heights } => (lines.into_iter().map(Part::Line).collect(), has_heights, None),
         Shape::Rings { rings, .. } if RINGS_MAX < rings.len() => return Err(rings.len()),
         Shape::Rings { rings, has_heights } => {

@@ -3,7 +3,7 @@
 use super::clip::Vertex;
 use super::raw::{Part, RawShape};
 
-/// The lines and polygons of a geometry.
+/// The points, lines and polygons of a geometry.
 ///
 /// # Errors
 /// In words, what it is instead of a geometry.
@@ -74,8 +74,10 @@ impl Binary<'_> {
         let axes = Axes { is_little, has_heights, count: 2 + usize::from(has_heights) + usize::from(has_measures) };
         match kind % 1000 {
             1 => {
-                self.place(axes)?;
-                self.shape.other = Some("Point");
+                let place = self.place(axes)?;
+                // POINT EMPTY is nowhere.
+                self.shape.parts.extend((!place[0].is_nan()).then_some(Part::Point(place)));
+                self.shape.has_heights |= has_heights;
             }
             2 => {
                 let line = self.run(axes)?;

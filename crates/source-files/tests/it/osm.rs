@@ -12,8 +12,15 @@ use crate::support::Folder;
 /// Ten kilometres a side round 117 W, 35 N, in UTM zone 11.
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
 
-const WANTED: Wanted =
-    Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: false };
+const WANTED: Wanted = Wanted {
+    epsg: 32611,
+    bounds: BOUNDS,
+    layer: None,
+    crs: None,
+    keys: &BUILT_IN_KEYS,
+    buildings: false,
+    points: false,
+};
 const ROAD: &[(&str, &str)] = &[("highway", "primary")];
 const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
 
@@ -70,6 +77,23 @@ fn ways_with_a_wanted_key_are_lines_in_metres_with_their_tags_sorted() {
     let folder = Folder::new();
     let file = read_features(&folder.write("a.osm.pbf", &osm.bytes()), &named, &in_turn).unwrap();
     assert_eq!(ids(&file), ["way/6"], "keys that the caller names");
+}
+
+#[test]
+fn nodes_with_a_wanted_key_are_points_where_points_are_wanted() {
+    let osm = grid().tagged(3, &[("man_made", "mast"), ("height", "40")]).tagged(5, &[("amenity", "bench")]).way(
+        7,
+        ROAD,
+        &[1, 2, 3],
+    );
+    let folder = Folder::new();
+    let path = folder.write("a.osm.pbf", &osm.bytes());
+    assert_eq!(ids(&read_features(&path, &WANTED, &in_turn).unwrap()), ["way/7"]);
+    let file = read_features(&path, &Wanted { points: true, ..WANTED }, &in_turn).unwrap();
+    let mast = file.features.iter().find(|feature| feature.id == "node/3").unwrap();
+    let expected = Crs::wgs84().to(&Crs::from_epsg(32611).unwrap(), [-116.997, 35.0]).unwrap();
+    assert_eq!((file.features.len(), &mast.shape, mast.tag("height")), (2, &VectorShape::Point(expected), Some("40")));
+    assert!(file.remarks.is_empty());
 }
 
 #[test]

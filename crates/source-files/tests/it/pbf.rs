@@ -1,5 +1,6 @@
 //! Makes small files of OpenStreetMap data, block by block, so that any of them can be wrong.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 
 use flate2::Compression;
@@ -75,6 +76,8 @@ pub type Tags<'a> = &'a [(&'a str, &'a str)];
 #[derive(Clone, Default)]
 pub struct Osm {
     pub nodes: Vec<(i64, [f64; 2])>,
+    /// Texts of keys and values of each node, by its number.
+    node_tags: BTreeMap<i64, Vec<(u64, u64)>>,
     ways: Vec<Vec<u8>>,
     relations: Vec<Vec<u8>>,
     texts: Vec<Vec<u8>>,
@@ -90,10 +93,21 @@ impl Osm {
         self.texts.len() as u64 - 1
     }
 
+    fn pairs(&mut self, tags: Tags) -> Vec<(u64, u64)> {
+        tags.iter().map(|(key, value)| (self.text(key), self.text(value))).collect()
+    }
+
     fn tags(&mut self, tags: Tags) -> Vec<u8> {
-        let pairs: Vec<(u64, u64)> = tags.iter().map(|(key, value)| (self.text(key), self.text(value))).collect();
+        let pairs = self.pairs(tags);
         let keys = bytes(2, &packed(pairs.iter().map(|pair| pair.0)));
         [keys, bytes(3, &packed(pairs.iter().map(|pair| pair.1)))].concat()
+    }
+
+    /// Gives a node tags.
+    pub fn tagged(mut self, id: i64, tags: Tags) -> Self {
+        let pairs = self.pairs(tags);
+        self.node_tags.insert(id, pairs);
+        self
     }
 
     pub fn way(mut self, id: i64, tags: Tags, nodes: &[i64]) -> Self {
@@ -121,7 +135,13 @@ impl Osm {
     pub fn blocks(&self, packing: Packing) -> [Vec<u8>; 3] {
         let axis = |axis: usize| differences(self.nodes.iter().map(|node| (node.1[axis] * 1.0e7).round() as i64));
         let ids = differences(self.nodes.iter().map(|node| node.0));
-        let dense = [bytes(1, &ids), bytes(8, &axis(1)), bytes(9, &axis(0))].concat();
+        let texts_of = |(id, _): &(i64, [f64; 2])| {
+            let pairs = self.node_tags.get(id).into_iter().flatten();
+            pairs.flat_map(|&(key, value)| [key, value]).chain([0]).collect::<Vec<u64>>()
+        };
+        // Files without a tag on any node have no such field.
+        let tags = if self.node_tags.is_empty() { vec![] } else { self.nodes.iter().flat_map(texts_of).collect() };
+        let dense = [bytes(1, &ids), bytes(8, &axis(1)), bytes(9, &axis(0)), bytes(10, &packed(tags))].concat();
         let texts: Vec<u8> = self.texts.iter().flat_map(|text| bytes(1, text)).collect();
         let block = |group: &[u8]| frame("OSMData", &[bytes(1, &texts), bytes(2, group)].concat(), packing);
         [block(&bytes(2, &dense)), block(&self.ways.concat()), block(&self.relations.concat())]

@@ -13,8 +13,15 @@ use crate::pbf::{Osm, bytes, frame, header, number};
 use crate::support::Folder;
 
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-const WANTED: Wanted =
-    Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: true };
+const WANTED: Wanted = Wanted {
+    epsg: 32611,
+    bounds: BOUNDS,
+    layer: None,
+    crs: None,
+    keys: &BUILT_IN_KEYS,
+    buildings: true,
+    points: false,
+};
 const ROAD: &[(&str, &str)] = &[("highway", "primary")];
 const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
 

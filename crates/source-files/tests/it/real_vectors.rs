@@ -20,11 +20,12 @@ fn read(file: &str, epsg: u32, [west, south, east, north]: [f64; 4]) -> Option<F
     let bounds = Extent { east: span(0), north: span(1) };
     let found = read_features(
         &path,
-        &Wanted { epsg, bounds, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: false },
+        &Wanted { epsg, bounds, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: false, points: false },
         &in_turn,
     )
     .unwrap();
     let places = found.features.iter().flat_map(|feature| match &feature.shape {
+        VectorShape::Point(_) => unreachable!("points are not wanted"),
         VectorShape::Line(line) => std::slice::from_ref(line),
         VectorShape::Polygon(rings) => rings,
     });

@@ -13,7 +13,8 @@ use crate::support::{Folder, Tiff};
 
 /// Ten kilometres a side in UTM zone 11.
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-const WANTED: Wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &[], buildings: false };
+const WANTED: Wanted =
+    Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &[], buildings: false, points: false };
 
 #[track_caller]
 fn read(path: &Path) -> FeatureFile {
@@ -35,6 +36,7 @@ fn tags(feature: &VectorFeature) -> Vec<(&str, &str)> {
 /// The number of vertices of the line, or of each ring, and the heights of the first.
 fn sizes(feature: &VectorFeature) -> (Vec<usize>, Vec<Option<f64>>) {
     match &feature.shape {
+        VectorShape::Point(_) => (vec![1], vec![]),
         VectorShape::Line(line) => (vec![line.places.len()], line.heights_m.clone()),
         VectorShape::Polygon(rings) => {
             (rings.iter().map(|ring| ring.places.len()).collect(), rings[0].heights_m.clone())
@@ -217,6 +219,23 @@ fn a_geopackage_gives_lines_with_heights_and_columns_as_tags() {
             "hydro.gpkg:rivers#5: a Point, where lines and polygons are read (left out)",
         ]
     );
+}
+
+#[test]
+fn points_are_read_where_they_are_wanted() {
+    let folder = Folder::new();
+    let wanted = Wanted { points: true, ..WANTED };
+    let places = |path: &Path| -> Vec<VectorShape> {
+        let file = read_features(path, &wanted, &in_turn).unwrap();
+        assert_eq!(file.remarks, []);
+        file.features.into_iter().map(|feature| feature.shape).collect()
+    };
+    let at = |east: f64| VectorShape::Point([east, 3.87e6]);
+    let point = |east: f64| [&blob(1, &[])[..13], &east.to_le_bytes(), &3.87e6_f64.to_le_bytes()].concat();
+    let path = package(&folder, &[("masts", &[point(500_000.0), point(600_000.0)])]);
+    assert_eq!(places(&path), [at(500_000.0)], "the other lies outside");
+    let text = r#"{"type":"MultiPoint","coordinates":[[500000,3870000],[500100,3870000,7]]}"#;
+    assert_eq!(places(&folder.write("a.geojson", text.as_bytes())), [at(500_000.0), at(500_100.0)]);
 }
 
 #[test]

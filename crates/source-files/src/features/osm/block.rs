@@ -122,22 +122,44 @@ impl<'a> Block<'a> {
         &self,
         mut found: impl FnMut(i64, Decimicro) -> Result<(), E>,
     ) -> Result<(), E> {
+        self.each_node(false, |id, place, _| found(id, place))
+    }
+
+    /// Tells `found` the id, place and tags of every node that has some: indices of keys and values in the texts.
+    pub(super) fn tagged_nodes<E: From<Fault>>(
+        &self,
+        mut found: impl FnMut(i64, Decimicro, &[(usize, usize)]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        self.each_node(true, |id, place, tags| if tags.is_empty() { Ok(()) } else { found(id, place, tags) })
+    }
+
+    /// All nodes, with their tags where they are asked for.
+    fn each_node<E: From<Fault>>(
+        &self,
+        with_tags: bool,
+        mut found: impl FnMut(i64, Decimicro, &[(usize, usize)]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (mut keys, mut values, mut tags) = (Vec::new(), Vec::new(), Vec::new());
         for group in &self.groups {
             for field in Fields(group) {
                 match field? {
                     (1, value) => {
                         let (mut id, mut at) = (0, [0; 2]);
+                        _ = [&mut keys, &mut values].map(Vec::clear);
                         for field in Fields(value.bytes()?) {
                             match field? {
                                 (1, value) => id = signed(value.number()?),
+                                (2, value) if with_tags => value.append_to(&mut keys, |index| index as usize)?,
+                                (3, value) if with_tags => value.append_to(&mut values, |index| index as usize)?,
                                 (8, value) => at[1] = signed(value.number()?),
                                 (9, value) => at[0] = signed(value.number()?),
                                 _ => {}
                             }
                         }
-                        found(id, self.place(at[0], at[1]))?;
+                        self.tags(&keys, &values, &mut tags)?;
+                        found(id, self.place(at[0], at[1]), &tags)?;
                     }
-                    (2, value) => self.dense_nodes(value.bytes()?, &mut found)?,
+                    (2, value) => self.dense_nodes(value.bytes()?, with_tags, &mut found)?,
                     _ => {}
                 }
             }
@@ -148,17 +170,22 @@ impl<'a> Block<'a> {
     fn dense_nodes<E: From<Fault>>(
         &self,
         bytes: &[u8],
-        found: &mut impl FnMut(i64, Decimicro) -> Result<(), E>,
+        with_tags: bool,
+        found: &mut impl FnMut(i64, Decimicro, &[(usize, usize)]) -> Result<(), E>,
     ) -> Result<(), E> {
         let [mut ids, mut norths, mut easts] = [const { Vec::new() }; 3];
+        // Keys and values by turns, a 0 after those of each node; nothing where no node has any.
+        let (mut texts, mut tags): (Vec<usize>, Vec<(usize, usize)>) = (Vec::new(), Vec::new());
         for field in Fields(bytes) {
             match field? {
                 (1, value) => value.append_to(&mut ids, signed)?,
                 (8, value) => value.append_to(&mut norths, signed)?,
                 (9, value) => value.append_to(&mut easts, signed)?,
+                (10, value) if with_tags => value.append_to(&mut texts, |index| index as usize)?,
                 _ => {}
             }
         }
+        let mut texts = texts.into_iter();
         if ids.len() != norths.len() || ids.len() != easts.len() {
             return Err("nodes without one latitude and longitude each".into());
         }
@@ -166,7 +193,14 @@ impl<'a> Block<'a> {
         for ((step, east), north) in ids.into_iter().zip(easts).zip(norths) {
             id = id.wrapping_add(step);
             at = [at[0].wrapping_add(east), at[1].wrapping_add(north)];
-            found(id, self.place(at[0], at[1]))?;
+            tags.clear();
+            while let Some(key) = texts.next().filter(|key| *key != 0) {
+                let value = texts.next().ok_or("a node's key without a value")?;
+                self.text(key)?;
+                self.text(value)?;
+                tags.push((key, value));
+            }
+            found(id, self.place(at[0], at[1]), &tags)?;
         }
         Ok(())
     }

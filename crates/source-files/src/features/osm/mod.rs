@@ -23,6 +23,7 @@ use terrain::Each;
 
 use super::model::{FeatureFile, Tags, Wanted};
 use super::placing::{LEFT_OUT, Placing, Texts};
+use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::allowance::Allowance;
 use crate::crs::Crs;
@@ -33,7 +34,7 @@ use block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
 use buildings::{BuildingTexts, Buildings};
 use frames::{Frame, FrameKind, Frames, Stop};
 use kept::{KeptRelation, KeptWay, SEGMENT_M_MAX, sort_ways};
-use nodes::Nodes;
+use nodes::{Nodes, degrees};
 use texts::{KnownTexts, wanted_texts};
 
 /// Whom to name (Open Database License, section 4.3).
@@ -84,6 +85,9 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
     placing.lies_over(&reader.nodes.lies);
     placing.count_outside((all - relations.len()) as u64);
     reader.tell_lost(&mut placing);
+    if wanted.points {
+        reader.points(&mut placing)?;
+    }
     let Reader { nodes, ways, buildings, .. } = reader;
     let buildings = buildings.map(|buildings| buildings.placed(&nodes, &placing, each)).unwrap_or_default();
     shapes::place(&nodes, ways, relations, &mut placing, kinds::is_area, each);
@@ -253,6 +257,30 @@ impl<'a> Reader<'a> {
             })?;
         }
         nodes.sort();
+        Ok(())
+    }
+
+    /// Places nodes near the area that have a wanted key.
+    fn points(&mut self, placing: &mut Placing) -> Result<(), SourceError> {
+        let Self { frames, blocks, keys, nodes, texts, .. } = self;
+        for (frame, _) in blocks.iter().filter(|(_, contents)| contents.nodes.is_some()) {
+            frames.with_bytes(frame, |bytes| {
+                let block = Block::read(bytes)?;
+                let is_wanted = wanted_texts(&block, keys);
+                let mut known = KnownTexts::of(&block);
+                block.tagged_nodes(|id, place, tags| {
+                    if place != OFF_THE_EARTH && tags.iter().any(|&(key, _)| is_wanted[key]) && nodes.is_near(id) {
+                        let [east, north] = degrees(place);
+                        let parts = vec![Part::Point([east, north, f64::NAN])];
+                        let shape = RawShape { parts, ..RawShape::default() };
+                        let tags = known.tags(&block, tags, texts);
+                        texts.count(placing.allowance());
+                        placing.place(RawFeature { id: format!("node/{id}"), tags, shape });
+                    }
+                    Ok::<_, Stop>(())
+                })
+            })?;
+        }
         Ok(())
     }
 
