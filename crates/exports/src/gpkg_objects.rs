@@ -68,7 +68,7 @@ pub(crate) fn add_objects(
             let height = whole.height.or_else(|| Some(whole.roof? - whole.base?));
             let geometry = match layer.geometry {
                 "POINT" => point_z(package.srs, middle(product, whole)),
-                _ => polygons(package.srs, &placed(product, &union(&[whole.rings.clone()]))),
+                _ => polygons(package.srs, &placed(product, &union(std::slice::from_ref(&whole.rings)))),
             };
             add.execute(params![
                 geometry,

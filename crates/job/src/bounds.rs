@@ -120,6 +120,8 @@ pub const OBJECT_CORNERS: std::ops::RangeInclusive<u64> = 4..=255;
 pub const OBJECT_AREA_M2: std::ops::RangeInclusive<f64> = 0.0..=10_000.0;
 /// Metres of height that a rule may give: the highest building has 828.
 pub const OBJECT_HEIGHT_M: std::ops::RangeInclusive<f64> = 0.1..=1000.0;
+/// Metres of the side of a cell of leaves.
+pub const CANOPY_CELL_M: std::ops::RangeInclusive<f64> = 2.0..=100.0;
 /// Polygons of objects in a load module or a square of 4 km.
 pub const OBJECT_LIMIT: std::ops::RangeInclusive<u64> = 0..=10_000_000;
 /// Metres that decks may be asked to keep clear of what runs below: the highest bridges leave so much.

@@ -3,8 +3,8 @@
 use terrain::ObjectKind;
 
 use crate::bounds::{
-    FEATURE_SOURCES_MAX, LAYER_CHARS_MAX, OBJECT_AREA_M2, OBJECT_CORNERS, OBJECT_HEIGHT_M, OBJECT_LIMIT, RULES_MAX,
-    TAG_CHARS_MAX, WKT_CHARS_MAX,
+    CANOPY_CELL_M, FEATURE_SOURCES_MAX, LAYER_CHARS_MAX, OBJECT_AREA_M2, OBJECT_CORNERS, OBJECT_HEIGHT_M, OBJECT_LIMIT,
+    RULES_MAX, TAG_CHARS_MAX, WKT_CHARS_MAX,
 };
 use crate::key::FILE_SAYS;
 use crate::{Choice, Key};
@@ -38,8 +38,8 @@ pub(crate) const OBJECT_LIMITS: &[Key] = &[
 ];
 
 pub(crate) const OBJECT_SOURCES: &[Key] = &[
-    Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile or GeoJSON")
-        .form("the path of a file of polygons and lines")
+    Key::new("file", "OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON, or a raster of heights of leaves")
+        .form("the path of a file of polygons and lines, or of a raster")
         .example(SOURCE),
     Key::new("layer", "its layer")
         .line("the name of a layer of a GeoPackage", LAYER_CHARS_MAX)
@@ -57,7 +57,17 @@ pub(crate) const OBJECT_SOURCES: &[Key] = &[
         .line("a coordinate system, as \"EPSG:4326\" or well-known text", WKT_CHARS_MAX)
         .otherwise(FILE_SAYS)
         .example("{ file = \"houses.shp\", crs = \"EPSG:32611\" }"),
+    Key::new("least_m", "of a raster of heights of leaves: the height under which there is no wood")
+        .number("metres", OBJECT_HEIGHT_M)
+        .usual("3")
+        .example(CANOPY),
+    Key::new("cell_m", "of a raster of heights of leaves: the side of the cells that woods are made of")
+        .number("metres", CANOPY_CELL_M)
+        .usual("12.5")
+        .example(CANOPY),
 ];
+
+const CANOPY: &str = "{ file = \"canopy.tif\", least_m = 3, cell_m = 12.5 }";
 
 const SOURCE: &str = "{ file = \"houses.gpkg\", kind = \"building\", height = \"h_m\" }";
 

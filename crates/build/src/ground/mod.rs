@@ -13,6 +13,7 @@ pub use bounds::Bounds;
 mod burn;
 pub use burn::{burn, posts_inside, slope_reach};
 mod buildings;
+mod canopy;
 mod lines;
 mod objects;
 pub use objects::FoundObjects;

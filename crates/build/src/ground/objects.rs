@@ -4,12 +4,13 @@ use std::collections::HashSet;
 
 use features::objects::{FoundObject, FoundShape, OBJECT_KEYS, traits};
 use job::{Job, ObjectsSpec};
-use source_files::{Crs, Done, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted};
+use source_files::{Crs, Done, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted, is_feature_file};
 use store::FeatureRemark;
 use terrain::{Each, ObjectKind};
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
+use crate::ground::canopy;
 use crate::ground::vectors::bounds;
 
 /// What the sources of objects hold that lies in the area or near it.
@@ -34,6 +35,14 @@ impl FoundObjects {
             let name = source.file.written.as_str();
             let crs = source.crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(name, &found)));
             let crs = crs.transpose()?;
+            if !is_feature_file(&source.file.path) {
+                let woods = canopy::woods(job, (spec, source), crs, area, each)?;
+                if woods.is_empty() {
+                    found.notes.push(format!("{name}: no leaves {} m high in the area", source.least_m));
+                }
+                found.objects.extend(woods);
+                continue;
+            }
             let mut keys: Vec<&str> = OBJECT_KEYS.into_iter().chain(spec.keys()).collect();
             keys.sort_unstable();
             keys.dedup();
@@ -44,6 +53,7 @@ impl FoundObjects {
                 crs: crs.as_ref(),
                 keys: &keys,
                 buildings: false,
+                points: true,
             };
             let FeatureFile { features, remarks, notes, .. } =
                 source_files::read_features(&source.file.path, &wanted, each)?;
@@ -86,6 +96,7 @@ fn shape_of(feature: &VectorFeature, kind: ObjectKind, area: &GamingArea) -> Fou
         line.places.iter().map(|place| [0, 1].map(|axis| place[axis] - origin[axis])).collect()
     };
     match &feature.shape {
+        VectorShape::Point(place) => FoundShape::Point([0, 1].map(|axis| place[axis] - origin[axis])),
         VectorShape::Polygon(rings) => FoundShape::Polygon(rings.iter().map(ring).collect()),
         VectorShape::Line(line) => {
             let is_closed = 3 < line.places.len() && line.places.first() == line.places.last();

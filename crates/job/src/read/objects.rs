@@ -68,7 +68,7 @@ fn of_features(objects: &Section, features: Option<&FeaturesSpec>) -> Result<Vec
     for source in features.iter().flat_map(|features| &features.sources) {
         let FeatureSource::File { file, layer, kind: _, crs } = source else { continue };
         let (file, layer, crs) = (file.clone(), layer.clone(), crs.clone());
-        let source = ObjectSource { file, layer, kind: None, height: None, crs };
+        let source = ObjectSource { layer, crs, ..ObjectSource::of(file) };
         if !sources.contains(&source) {
             sources.push(source);
         }
@@ -102,7 +102,7 @@ fn sources(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec
 
 fn source(item: &Entry, job: &Path) -> Result<ObjectSource, JobError> {
     if !item.is_table() {
-        return Ok(ObjectSource { file: item.file(job)?, layer: None, kind: None, height: None, crs: None });
+        return Ok(ObjectSource::of(item.file(job)?));
     }
     let table = item.table()?;
     let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();
@@ -112,6 +112,8 @@ fn source(item: &Entry, job: &Path) -> Result<ObjectSource, JobError> {
         kind: table.optional("kind").map(|kind| kind.word()).transpose()?,
         height: text("height")?,
         crs: text("crs")?,
+        least_m: table.number("least_m")?,
+        cell_m: table.number("cell_m")?,
     })
 }
 

@@ -180,3 +180,43 @@ fn a_wood_and_a_house_alone_make_a_file_of_version_3() {
     assert!(kinds.contains(&ObjectKind::Building));
     assert!(file.modules().iter().any(|module| !module.objects.canopies.is_empty()));
 }
+
+/// Leaves of 14 m over a square, of 7 m beside it, a void in the middle, on posts of 5 m.
+fn leaves() -> String {
+    let (posts, [west, south]) = (200, crate::scene::ORIGIN_M);
+    let height = |row: i32, col: i32| match (row, col) {
+        (45..=49, 45..=49) => "-9",
+        (20..=79, 20..=79) => "14",
+        (20..=79, 80..=119) => "7",
+        _ => "0",
+    };
+    let line = |row: i32| (0..posts).map(|col| height(row, col)).collect::<Vec<_>>().join(" ");
+    let lines: Vec<String> = (0..posts).rev().map(line).collect();
+    let head = format!("ncols {posts}\nnrows {posts}\nxllcenter {west}\nyllcenter {south}\ncellsize 5\n");
+    format!("{head}NODATA_value -9\n{}\n", lines.join("\n"))
+}
+
+#[test]
+fn leaves_of_a_raster_are_woods_by_height() {
+    let crs = format!("crs = \"EPSG:{}\"", crate::scene::EPSG);
+    let scene = |more: &str| {
+        let objects = format!("[objects]\nsources = [{{ file = \"leaves.asc\", {crs}{more} }}]");
+        let words = Words { size: (4, 4), tiles: (2, 2), objects, ..Words::raster() };
+        let dem = terrain::Dem::from_fn(words.grid().area(), |post| Some(64_000 + post.col));
+        Scene::with_files(&words, |folder| {
+            crate::scene::write_dem(&folder.join("dem.tif"), &dem);
+            fs::write(folder.join("leaves.asc"), leaves()).unwrap();
+        })
+    };
+    let tall = scene("");
+    tall.build("area.tdb", 2);
+    tall.verify("area.tdb");
+    let ground = loaded(&tall);
+    let up = |east: f64, north: f64| {
+        let place = [0, 1].map(|axis| crate::scene::ORIGIN_M[axis] + [east, north][axis]);
+        (100.0 * (ground.top(place).unwrap().height_m - ground.height_m(place).unwrap())).round() / 100.0
+    };
+    assert_eq!([up(200.0, 200.0), up(500.0, 250.0), up(700.0, 250.0), up(235.0, 235.0)], [13.5, 7.5, 0.0, 0.0]);
+    let report = scene(", least_m = 10, kind = \"scrub\"").build("area.tdb", 1).report.objects.unwrap();
+    assert_eq!(report.kinds.iter().map(|sums| (sums.kind.as_str(), sums.kept)).collect::<Vec<_>>(), [("scrub", 1)]);
+}
