@@ -13,11 +13,14 @@ pub struct Carries {
     pub ribbons: &'static str,
     /// What buildings, walls and woods become.
     pub objects: &'static str,
+    /// What orthophotos become that are laid over the ground.
+    pub textures: &'static str,
     /// What becomes of triangles over holes, where no source has a height.
     pub holes: &'static str,
 }
 
-const LEFT_OUT: &str = "left out";
+/// What a format says of what it has no room for.
+pub const LEFT_OUT: &str = "left out";
 const GROUND_ALONE: &str = "left out: there is room for the ground alone";
 
 const MESH: Carries = Carries {
@@ -26,10 +29,16 @@ const MESH: Carries = Carries {
     decks: "meshes of their own",
     ribbons: "meshes of their own",
     objects: "meshes of their own",
+    textures: LEFT_OUT,
     holes: LEFT_OUT,
 };
 const RASTER: Carries =
     Carries { classes: LEFT_OUT, decks: GROUND_ALONE, ribbons: GROUND_ALONE, objects: GROUND_ALONE, ..MESH };
+const TILES: Carries = Carries {
+    objects: "meshes whose features have id, class and height",
+    textures: "a JPEG in each tile, coarser farther away",
+    ..MESH
+};
 const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where they are";
 
 /// The table, in the order of the formats.
@@ -40,6 +49,7 @@ pub const CARRIES: [Carries; 15] = [
         decks: "in the files of their load modules",
         ribbons: "middle lines in the files of their load modules",
         objects: "in the files of their load modules",
+        textures: LEFT_OUT,
         holes: "of class 255, as in the database",
     },
     Carries {
@@ -50,8 +60,14 @@ pub const CARRIES: [Carries; 15] = [
         objects: "the last faces",
         ..MESH
     },
-    Carries { format: "obj", classes: "materials in NAME.mtl", objects: "an object each", ..MESH },
-    Carries { format: "glb", objects: "a node each, with id and height", ..MESH },
+    Carries {
+        format: "obj",
+        classes: "materials in NAME.mtl",
+        objects: "an object each",
+        textures: "a JPEG beside it",
+        ..MESH
+    },
+    Carries { format: "glb", objects: "a node each, with id and height", textures: "a JPEG inside", ..MESH },
     Carries { format: "geotiff", holes: "NaN in the raster", ..RASTER },
     Carries {
         format: "gpkg",
@@ -59,6 +75,7 @@ pub const CARRIES: [Carries; 15] = [
         decks: "in the layer decks",
         ribbons: "left out: --format features has the lines",
         objects: "in the layers buildings, woods, rows and points",
+        textures: LEFT_OUT,
         holes: "in the layer triangles, of class hole",
     },
     Carries {
@@ -67,24 +84,32 @@ pub const CARRIES: [Carries; 15] = [
         decks: "in the layer decks",
         ribbons: "in the layer lines",
         objects: "left out: --format gpkg has them",
+        textures: LEFT_OUT,
         holes: "in none of its layers",
     },
     Carries {
         format: "openflight",
         classes: "materials and surface material codes",
         objects: "an object each, their materials from code 256 on",
+        textures: "a JPEG for each square",
         ..MESH
     },
-    Carries { format: "3dtiles", objects: "meshes whose features have id, class and height", ..MESH },
+    Carries { format: "3dtiles", ..TILES },
     Carries { format: "quantized-mesh", classes: "water alone, as a mask", holes: CLOSED, ..RASTER },
-    Carries { format: "3tz", objects: "meshes whose features have id, class and height", ..MESH },
+    Carries { format: "3tz", ..TILES },
     Carries {
         format: "mbtiles",
         classes: "water alone, as a mask",
         holes: "kept, since tiles must be closed; the entry holes of metadata says where they are",
         ..RASTER
     },
-    Carries { format: "usd", classes: "subsets with materials", objects: "a prim each, with id and height", ..MESH },
+    Carries {
+        format: "usd",
+        classes: "subsets with materials",
+        objects: "a prim each, with id and height",
+        textures: "a JPEG for each tile",
+        ..MESH
+    },
     Carries {
         format: "heightmap",
         holes: "as high as the triangles that close them; heightmap.json counts the samples",
@@ -95,6 +120,7 @@ pub const CARRIES: [Carries; 15] = [
         classes: "materials in classes.mtl",
         ribbons: "meshes that are seen and not hit",
         objects: "meshes that are seen, and boxes that are hit",
+        textures: "a JPEG for each block",
         ..MESH
     },
 ];
@@ -102,11 +128,12 @@ pub const CARRIES: [Carries; 15] = [
 /// A column of the table: what it is called, and how it is read.
 type Column = (&'static str, fn(&Carries) -> &'static str);
 
-const COLUMNS: [Column; 5] = [
+const COLUMNS: [Column; 6] = [
     ("classes", |row| row.classes),
     ("decks of bridges", |row| row.decks),
     ("ribbons", |row| row.ribbons),
     ("objects", |row| row.objects),
+    ("orthophotos", |row| row.textures),
     ("holes", |row| row.holes),
 ];
 

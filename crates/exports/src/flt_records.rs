@@ -4,8 +4,8 @@
 const REVISION: i32 = 1610;
 /// Bytes of a palette's own record, before its first vertex.
 pub(crate) const PALETTE_BYTES: usize = 8;
-/// Bytes of a vertex with colour and normal.
-pub(crate) const VERTEX_BYTES: usize = 56;
+/// Bytes of a vertex with colour and normal, and of one with a place in a texture, too.
+const VERTEX_BYTES: [usize; 2] = [56, 64];
 /// Bytes of the longest record: its length has 16 bits.
 const RECORD_BYTES_MAX: usize = 65_532;
 
@@ -19,8 +19,10 @@ mod opcode {
     pub const COMMENT: u16 = 31;
     pub const LONG_ID: u16 = 33;
     pub const EXTERNAL: u16 = 63;
+    pub const TEXTURE: u16 = 64;
     pub const VERTEX_PALETTE: u16 = 67;
     pub const VERTEX_NORMAL: u16 = 69;
+    pub const VERTEX_NORMAL_UV: u16 = 70;
     pub const VERTEX_LIST: u16 = 72;
     pub const MATERIAL: u16 = 113;
 }
@@ -29,6 +31,17 @@ mod opcode {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Records {
     bytes: Vec<u8>,
+    /// Whether vertices of the palette have places in a texture.
+    has_places: bool,
+}
+
+/// A vertex of the palette.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FltVertex {
+    pub place: [f64; 3],
+    pub normal: [f64; 3],
+    /// Its place in the texture, from the south-western corner, where there is one.
+    pub uv: Option<[f32; 2]>,
 }
 
 /// What the header says of the place.
@@ -54,6 +67,8 @@ pub(crate) struct Face {
     pub color: [u8; 3],
     /// Whether it is drawn from both sides.
     pub is_seen_from_below: bool,
+    /// Whether it is seen with the texture of the file.
+    pub has_texture: bool,
 }
 
 impl Records {
@@ -181,18 +196,33 @@ impl Records {
         }
     }
 
-    /// The palette of all vertices: place, normal.
-    pub(crate) fn vertices(&mut self, vertices: &[([f64; 3], [f64; 3])]) {
+    /// The only texture, by its path from this file.
+    pub(crate) fn texture(&mut self, path: &str) {
+        self.open(opcode::TEXTURE, 216);
+        self.text(path, 200);
+        // Its index, and where it is shown in an editor's palette.
+        self.i32s(&[0, 0, 0]);
+    }
+
+    /// The palette of all vertices; all of them have a place in the texture, or none.
+    pub(crate) fn vertices(&mut self, vertices: &[FltVertex]) {
         const PACKED_COLOUR: i16 = 0x1000;
+        self.has_places = vertices.first().is_some_and(|vertex| vertex.uv.is_some());
+        let opcode = if self.has_places { opcode::VERTEX_NORMAL_UV } else { opcode::VERTEX_NORMAL };
         self.open(opcode::VERTEX_PALETTE, PALETTE_BYTES);
-        self.u32s(&[(PALETTE_BYTES + vertices.len() * VERTEX_BYTES) as u32]);
-        for (place, normal) in vertices {
-            self.open(opcode::VERTEX_NORMAL, VERTEX_BYTES);
+        self.u32s(&[(PALETTE_BYTES + vertices.len() * self.vertex_bytes()) as u32]);
+        for FltVertex { place, normal, uv } in vertices {
+            self.open(opcode, self.vertex_bytes());
             self.i16s(&[0, PACKED_COLOUR]);
             self.f64s(place);
             normal.iter().for_each(|part| self.bytes.extend_from_slice(&(*part as f32).to_be_bytes()));
+            uv.iter().flatten().for_each(|part| self.bytes.extend_from_slice(&part.to_be_bytes()));
             self.u32s(&[u32::MAX, 0, 0]);
         }
+    }
+
+    fn vertex_bytes(&self) -> usize {
+        VERTEX_BYTES[usize::from(self.has_places)]
     }
 
     /// A material of the palette by its name: white, so that faces keep their colours, and dull.
@@ -221,8 +251,8 @@ impl Records {
         self.zeros(8 + 4 + 2);
         self.put(&[u8::from(face.is_seen_from_below), 0]);
         self.zeros(4 + 2);
-        // No textures; the class as surface material code; no feature.
-        self.i16s(&[-1, -1, face.material, face.code, 0]);
+        // No texture of details; the class as surface material code; no feature.
+        self.i16s(&[-1, i16::from(face.has_texture) - 1, face.material, face.code, 0]);
         self.zeros(4 + 2 + 2);
         self.u32s(&[TERRAIN_PACKED_COLOUR]);
         self.put(&[FACE_COLOUR_WITH_NORMALS]);
@@ -233,7 +263,8 @@ impl Records {
         self.i16s(&[0, -1]);
         self.push();
         self.open(opcode::VERTEX_LIST, 16);
-        self.u32s(&triangle.map(|v| (PALETTE_BYTES + v as usize * VERTEX_BYTES) as u32));
+        let bytes = self.vertex_bytes();
+        self.u32s(&triangle.map(|v| (PALETTE_BYTES + v as usize * bytes) as u32));
         self.pop();
     }
 
@@ -272,11 +303,12 @@ mod tests {
         assert_eq!(all.bytes.len(), 324);
         all.comment("abc");
         all.material(0, "building_wall");
-        all.vertices(&[([0.0; 3], [0.0, 0.0, 1.0]); 3]);
+        all.vertices(&[FltVertex { place: [0.0; 3], normal: [0.0, 0.0, 1.0], uv: None }; 3]);
         all.push();
         all.group("a");
         all.object("r0001c0002");
-        all.face([0, 1, 2], Face { code: 3, material: 0, color: [1, 2, 3], is_seen_from_below: true });
+        let face = Face { code: 3, material: 0, color: [1, 2, 3], is_seen_from_below: true, has_texture: false };
+        all.face([0, 1, 2], face);
         all.external("squares/r00c00.flt");
         all.pop();
         let expected = [
@@ -299,5 +331,21 @@ mod tests {
             (11, 4),
         ];
         assert_eq!(records(&all.into_bytes()), expected);
+    }
+
+    #[test]
+    fn vertices_with_places_in_a_texture_are_longer_and_faces_find_them() {
+        let mut all = Records::default();
+        all.texture("r00c00.jpg");
+        all.vertices(&[FltVertex { place: [0.0; 3], normal: [0.0, 0.0, 1.0], uv: Some([0.25, 0.5]) }; 3]);
+        all.face(
+            [0, 1, 2],
+            Face { code: 3, material: 0, color: [255; 3], is_seen_from_below: false, has_texture: true },
+        );
+        let found = records(&all.bytes);
+        assert_eq!(found[..5], [(64, 216), (67, 8), (70, 64), (70, 64), (70, 64)]);
+        assert_eq!(all.bytes[224 + 44..][..8], [0.25_f32.to_be_bytes(), 0.5_f32.to_be_bytes()].concat());
+        let list = all.bytes.len() - 4 - 12;
+        assert_eq!(all.bytes[list + 8..][..4], (8_u32 + 128).to_be_bytes());
     }
 }

@@ -13,9 +13,9 @@ use crate::boxes::{UprightBox, boxes};
 use crate::gpkg_styles::escaped;
 use crate::mesh::{Part, class_groups};
 use crate::modules::group_name;
-use crate::polygon_files::{put_obj_faces, put_obj_vertices};
+use crate::polygon_files::{put_obj_faces, put_obj_places, put_obj_vertices};
 use crate::sheets::Material;
-use crate::{Datum, Earth, ExportError, Mesh, Product, Put, Sheet, Work, obj_materials};
+use crate::{Datum, Earth, ExportError, Mesh, Product, Put, Sheet, Texture, Work, obj_materials};
 
 /// Load modules along the side of a block, as many as a level pages at once.
 const BLOCK_MODULES: u32 = 4;
@@ -32,7 +32,8 @@ const OBSERVER_M: f64 = 2.0;
 /// When a file cannot be written, the area's system cannot be computed, or the work was asked to stop.
 pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
     let mesh = Mesh::of(product);
-    let materials = obj_materials(product, &mesh, None);
+    // With orthophotos each block has a library of its own, since each has another.
+    let materials = if product.textures.is_some() { None } else { obj_materials(product, &mesh, None) };
     let squares = product.squares(BLOCK_MODULES);
     let blocks = work.each("blocks", &squares, |&rect| {
         let (seen, solid): (Vec<_>, Vec<_>) = mesh
@@ -40,11 +41,20 @@ pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), Exp
             .into_iter()
             .partition(|(sheet, _)| matches!(sheet, Sheet::Ribbons | Sheet::Objects));
         let block = Block { rect, is_solid: !solid.is_empty(), is_seen: !seen.is_empty() };
+        let (name, texture) = (group_name(rect), product.texture(rect, 0.0)?);
+        let put = |name: &str, bytes: &[u8]| put(name, bytes).map_err(ExportError::write(name));
+        let library = texture.as_ref().map(|_| format!("{name}.mtl"));
+        let library = library.or_else(|| materials.as_ref().map(|_| "classes.mtl".to_owned()));
         for (name, parts) in [(block.solid_name(), &solid), (block.seen_name(), &seen)] {
             if !parts.is_empty() {
-                let text = block_text(product, &mesh, rect, parts, materials.is_some());
-                put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+                let text = block_text(product, &mesh, (rect, texture.as_ref()), parts, library.as_deref());
+                put(&name, text.as_bytes())?;
             }
+        }
+        if let Some(texture) = texture.filter(|_| block.is_solid || block.is_seen) {
+            let text = obj_materials(product, &mesh, Some(&format!("{name}.jpg"))).unwrap_or_default();
+            put(&format!("meshes/{name}.mtl"), text.as_bytes())?;
+            put(&format!("meshes/{name}.jpg"), &texture.jpeg)?;
         }
         Ok(Some(block).filter(|block| block.is_solid || block.is_seen))
     })?;
@@ -78,15 +88,13 @@ impl Block {
 fn block_text(
     product: &Product,
     mesh: &Mesh,
-    rect: ModuleRect,
+    (rect, texture): (ModuleRect, Option<&Texture>),
     parts: &[(Sheet, Part)],
-    has_materials: bool,
+    library: Option<&str>,
 ) -> String {
     let [west, south] = corner(product, rect);
     let mut bytes: Vec<u8> = Vec::new();
-    if has_materials {
-        bytes.extend(b"mtllib classes.mtl\n");
-    }
+    bytes.extend(library.map_or_else(String::new, |library| format!("mtllib {library}\n")).bytes());
     let metres = |vertex: &u32| {
         let [x, y, z] = mesh.vertices[*vertex as usize];
         [x - west, y - south, z].map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE))
@@ -94,15 +102,19 @@ fn block_text(
     let mut first = 0;
     // Nothing fails where bytes go to memory.
     let _ = put_obj_vertices(&mut bytes, parts.iter().flat_map(|(_, part)| &part.vertices).map(metres));
+    for (_, part) in parts.iter().filter(|_| texture.is_some()) {
+        let _ = put_obj_places(&mut bytes, &texture.map_or_else(Vec::new, |texture| mesh.uvs(texture, &part.vertices)));
+    }
     for (sheet, part) in parts {
         bytes.extend(format!("o {}\n", sheet.name()).bytes());
         for (class, triangles) in class_groups(&part.triangles, &part.classes) {
-            if has_materials {
+            if library.is_some() {
                 let material = Material { sheet: *sheet, class };
                 bytes.extend(format!("usemtl {}\n", material.word(product.classes())).bytes());
             }
             let moved: Vec<[u32; 3]> = triangles.iter().map(|triangle| triangle.map(|v| v + first)).collect();
-            let _ = put_obj_faces(&mut bytes, moved.iter());
+            let has_texture = texture.is_some() && *sheet != Sheet::Objects;
+            let _ = put_obj_faces(&mut bytes, moved.iter(), has_texture);
         }
         first += part.vertices.len() as u32;
     }

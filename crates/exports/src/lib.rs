@@ -21,7 +21,7 @@ pub use product::{Block, Levels, Product};
 mod textures;
 pub use textures::{Texture, Textures};
 mod carries;
-pub use carries::{CARRIES, Carries, carries_table, carries_text};
+pub use carries::{CARRIES, Carries, LEFT_OUT, carries_table, carries_text};
 mod mesh;
 mod objects;
 mod ribbons;

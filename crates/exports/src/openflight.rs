@@ -9,7 +9,7 @@ use std::ops::Range;
 use terrain::{ModuleId, ModuleRect};
 
 use crate::earth::Earth;
-use crate::flt_records::{Face, Place, Records};
+use crate::flt_records::{Face, FltVertex, Place, Records};
 use crate::mesh::{Mesh, Part};
 use crate::metaflight::{Grid, metaflight};
 use crate::modules::{alone, sheet_name};
@@ -40,22 +40,37 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
         let mut records = Records::default();
         records.header(&place(product, &earth, rect)?);
         records.comment(&about);
+        let texture = product.texture(rect, 0.0)?;
+        if texture.is_some() {
+            // Beside this file.
+            records.texture(&square_name(product, rect, "jpg"));
+        }
         let materials = mesh.groups();
         for (index, material) in materials.iter().enumerate() {
             records.material(index as i32, &material.word(product.classes()));
         }
-        let vertex = |&v: &u32| (places[v as usize], normals[v as usize]);
-        records.vertices(&parts.iter().flat_map(|(_, part)| &part.vertices).map(vertex).collect::<Vec<_>>());
+        let all: Vec<u32> = parts.iter().flat_map(|(_, part)| &part.vertices).copied().collect();
+        let uvs = texture.as_ref().map(|texture| mesh.uvs(texture, &all));
+        let vertex = |(at, &v): (usize, &u32)| FltVertex {
+            place: places[v as usize],
+            normal: normals[v as usize],
+            uv: uvs.as_ref().map(|uvs| [uvs[at][0], 1.0 - uvs[at][1]]),
+        };
+        records.vertices(&all.iter().enumerate().map(vertex).collect::<Vec<_>>());
         records.push();
         let mut first = 0;
         for (sheet, part) in &parts {
             records.group(if *sheet == Sheet::Ground { "square" } else { sheet.name() });
-            put_objects(&mut records, (product, &materials), (*sheet, part), first);
+            let has_texture = texture.is_some() && *sheet != Sheet::Objects;
+            put_objects(&mut records, (product, &materials, has_texture), (*sheet, part), first);
             first += part.vertices.len() as u32;
         }
         records.pop();
         let name = format!("squares/{}", square_name(product, rect, "flt"));
-        put(&name, &records.into_bytes()).map_err(ExportError::write(&name))
+        put(&name, &records.into_bytes()).map_err(ExportError::write(&name))?;
+        let Some(texture) = texture else { return Ok(()) };
+        let name = format!("squares/{}", square_name(product, rect, "jpg"));
+        put(&name, &texture.jpeg).map_err(ExportError::write(&name))
     })?;
     let mut records = Records::default();
     records.header(&place(product, &earth, product.rect)?);
@@ -76,7 +91,7 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
 /// The faces of each load module of a sheet, or of each object, as an object; its vertices begin at `first`.
 fn put_objects(
     records: &mut Records,
-    (product, materials): (&Product, &[Material]),
+    (product, materials, has_texture): (&Product, &[Material], bool),
     (sheet, part): (Sheet, &Part),
     first: u32,
 ) {
@@ -94,9 +109,11 @@ fn put_objects(
         records.push();
         for (triangle, &class) in part.triangles[range.clone()].iter().zip(&part.classes[range]) {
             let material = Material { sheet, class };
-            let (code, color) = (material.number(), material.color(product.classes()));
+            // A texture is seen in its own colours.
+            let color = if has_texture { [255; 3] } else { material.color(product.classes()) };
+            let code = material.number();
             let material = materials.iter().position(|of| *of == material).map_or(-1, |place| place as i16);
-            let face = Face { code, material, color, is_seen_from_below: sheet.is_seen_from_below() };
+            let face = Face { code, material, color, is_seen_from_below: sheet.is_seen_from_below(), has_texture };
             records.face(triangle.map(|v| first + v), face);
         }
         records.pop();

@@ -60,8 +60,7 @@ pub fn write_obj(
     put_obj_vertices(out, metres(mesh, product, &facts))?;
     if let Some(texture) = texture {
         let all: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
-        // From the southern side.
-        mesh.uvs(texture, &all).iter().try_for_each(|[u, v]| writeln!(out, "vt {u} {}", 1.0 - v))?;
+        put_obj_places(out, &mesh.uvs(texture, &all))?;
     }
     let has_materials = library.is_some();
     let mut last = Sheet::Ground;
@@ -76,10 +75,7 @@ pub fn write_obj(
         if has_materials {
             writeln!(out, "usemtl {}", group.word(classes))?;
         }
-        match texture {
-            Some(_) => mesh.of_group(group).try_for_each(|corners| put_textured_face(out, corners))?,
-            None => put_obj_faces(out, mesh.of_group(group))?,
-        }
+        put_obj_faces(out, mesh.of_group(group), texture.is_some())?;
     }
     for (thing, part) in mesh.part(product, Sheet::Objects, product.rect).by_thing() {
         writeln!(out, "o {}", thing.name())?;
@@ -88,16 +84,10 @@ pub fn write_obj(
                 writeln!(out, "usemtl {}", Material { sheet: Sheet::Objects, class }.word(classes))?;
             }
             let of_mesh = |triangle: &[u32; 3]| triangle.map(|v| part.vertices[v as usize]);
-            put_obj_faces(out, triangles.iter().map(of_mesh).collect::<Vec<_>>().iter())?;
+            put_obj_faces(out, triangles.iter().map(of_mesh).collect::<Vec<_>>().iter(), false)?;
         }
     }
     Ok(())
-}
-
-/// A face whose corners have the same numbers as vertices and as places in a texture.
-fn put_textured_face(out: &mut impl Write, corners: &[u32; 3]) -> Result<()> {
-    let [a, b, c] = corners.map(|corner| corner + 1);
-    writeln!(out, "f {a}/{a} {b}/{b} {c}/{c}")
 }
 
 /// The text of a library of materials for an OBJ, one for each class; `None` where all is ground of one class, which
@@ -174,9 +164,25 @@ pub(crate) fn put_obj_vertices(out: &mut impl Write, mut vertices: impl Iterator
     vertices.try_for_each(|[x, y, z]| writeln!(out, "v {x} {y} {z}"))
 }
 
-/// Faces of an OBJ, which counts vertices from one.
-pub(crate) fn put_obj_faces<'a>(out: &mut impl Write, triangles: impl Iterator<Item = &'a [u32; 3]>) -> Result<()> {
-    triangles.into_iter().try_for_each(|[a, b, c]| writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1))
+/// Places of an OBJ's vertices in a texture, which count from its southern side.
+pub(crate) fn put_obj_places(out: &mut impl Write, uvs: &[[f32; 2]]) -> Result<()> {
+    uvs.iter().try_for_each(|[u, v]| writeln!(out, "vt {u} {}", 1.0 - v))
+}
+
+/// Faces of an OBJ, which counts vertices from one; in a texture their corners have the same numbers.
+pub(crate) fn put_obj_faces<'a>(
+    out: &mut impl Write,
+    triangles: impl Iterator<Item = &'a [u32; 3]>,
+    has_texture: bool,
+) -> Result<()> {
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|corner| corner + 1);
+        match has_texture {
+            true => writeln!(out, "f {a}/{a} {b}/{b} {c}/{c}")?,
+            false => writeln!(out, "f {a} {b} {c}")?,
+        }
+    }
+    Ok(())
 }
 
 impl Mesh {

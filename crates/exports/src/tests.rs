@@ -392,3 +392,68 @@ fn a_draped_edge_bends_where_the_ground_does() {
     let back = ground.along([[64_000.0, 64_000.0], [0.0, 0.0]]);
     assert_eq!((back.len() <= 4, back[0][2], back[back.len() - 1][2]), (true, 127_872.0, 128_256.0));
 }
+
+/// Whether a place lies where its texture has it: 1001 x 501 texels, the first in the middle of the south-west corner.
+#[track_caller]
+fn check_place([east, north]: [f64; 2], [u, v]: [f64; 2]) {
+    let expected = [(east + 0.5) / 1001.0, (north + 0.5) / 501.0];
+    assert!((expected[0] - u).abs() < 1e-6 && (expected[1] - v).abs() < 1e-6, "{east} {north}: {u} {v}, {expected:?}");
+}
+
+/// The numbers of a text, whatever stands between them.
+fn numbers(text: &str) -> Vec<f64> {
+    text.split(|c: char| !matches!(c, '0'..='9' | '.' | '-' | 'e')).filter_map(|part| part.parse().ok()).collect()
+}
+
+#[test]
+fn engines_and_simulators_find_the_photo_where_their_vertices_lie() {
+    let folder = tempfile::tempdir().unwrap();
+    let product = textured(folder.path(), samples::product(), 1.0);
+
+    let usd = files(|put, work| crate::write_usd(&product, put, work));
+    assert_eq!(decoded(&usd["tiles/tile_r00c00.jpg"]).1, 1001);
+    let text = String::from_utf8_lossy(&usd["tiles/tile_r00c00.usda"]).into_owned();
+    let list = |name: &str| {
+        let line = text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{text}"));
+        numbers(&line[line.find('=').unwrap()..])
+    };
+    let (points, places) = (list("point3f[] points"), list("texCoord2f[] primvars:st"));
+    assert_eq!(points.len() / 3, places.len() / 2);
+    points.as_chunks::<3>().0.iter().zip(places.as_chunks().0).for_each(|(at, uv)| check_place([at[0], at[1]], *uv));
+    assert!(text.contains("@./tile_r00c00.jpg@") && text.contains("Photo.outputs:rgb"));
+
+    let flt = files(|put, work| crate::write_openflight(&product, put, work));
+    assert_eq!(decoded(&flt["squares/r00c00.jpg"]).1, 1001);
+    let bytes = &flt["squares/r00c00.flt"];
+    let (mut at, mut vertices, mut named) = (0, 0, false);
+    while at < bytes.len() {
+        let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+        let double = |from: usize| f64::from_be_bytes(bytes[at + from..][..8].try_into().unwrap());
+        let float = |from: usize| f64::from(f32::from_be_bytes(bytes[at + from..][..4].try_into().unwrap()));
+        match word(at) {
+            64 => named = bytes[at + 4..].starts_with(b"r00c00.jpg\0"),
+            70 => {
+                check_place([double(8), double(16)], [float(44), float(48)]);
+                vertices += 1;
+            }
+            // Faces have it, and their own colour is white.
+            5 => assert_eq!((word(at + 28), &bytes[at + 56..at + 60]), (0, &[255; 4][..])),
+            _ => {}
+        }
+        at += usize::from(word(at + 2));
+    }
+    assert!(named && 4 < vertices, "{vertices}");
+
+    let gazebo = files(|put, work| crate::write_gazebo(&product, put, work));
+    let name = gazebo.keys().find_map(|name| name.strip_suffix(".jpg")).unwrap().to_owned();
+    assert_eq!(decoded(&gazebo[&format!("{name}.jpg")]).1, 1001);
+    let text = |end: &str| String::from_utf8_lossy(&gazebo[&format!("{name}.{end}")]).into_owned();
+    let file = name.strip_prefix("meshes/").unwrap();
+    assert!(text("mtl").contains(&format!("map_Kd {file}.jpg")));
+    let obj = text("obj");
+    let of = |mark: &str| obj.lines().filter(|line| line.starts_with(mark)).map(numbers).collect::<Vec<_>>();
+    let (points, places) = (of("v "), of("vt "));
+    assert_eq!(points.len(), places.len());
+    points.iter().zip(&places).for_each(|(at, uv)| check_place([at[0], at[1]], [uv[0], uv[1]]));
+    assert!(obj.contains(&format!("mtllib {file}.mtl\n")) && obj.contains("/1 "));
+}

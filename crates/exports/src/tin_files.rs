@@ -79,7 +79,7 @@ pub fn write_tin_obj(out: &mut impl Write, tin: &Tin, place: &TinPlace, coordina
     let zero_m = place.zero_m(tin, coordinates);
     put_obj_comments(out, &place.comments(zero_m, coordinates))?;
     put_obj_vertices(out, place.metres(tin, zero_m))?;
-    put_obj_faces(out, tin.triangles.iter())
+    put_obj_faces(out, tin.triangles.iter(), false)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use terrain::{ModuleRect, QUANTA_PER_METRE, TileId};
 use crate::mesh::Part;
 use crate::objects::Thing;
 use crate::sheets::Material;
-use crate::{Coordinates, ExportError, Facts, Mesh, Product, Put, Sheet, Work};
+use crate::{Coordinates, ExportError, Facts, Mesh, Product, Put, Sheet, Texture, Work};
 
 /// Writes `area.usda` and a file for each tile in the folder `tiles`.
 ///
@@ -23,9 +23,13 @@ pub fn write_usd(product: &Product, put: &Put, work: &Work) -> Result<(), Export
     let normals = mesh.normals();
     let tiles = tiles(product);
     work.each("tiles", &tiles, |tile| {
-        let text = tile_text(product, &mesh, &normals, tile);
+        let texture = product.texture(tile.rect, 0.0)?;
+        let text = tile_text(product, &mesh, &normals, tile, texture.as_ref());
         let name = format!("tiles/{}.usda", tile.name);
-        put(&name, text.as_bytes()).map_err(ExportError::write(&name))
+        put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+        let Some(texture) = texture else { return Ok(()) };
+        let name = format!("tiles/{}.jpg", tile.name);
+        put(&name, &texture.jpeg).map_err(ExportError::write(&name))
     })?;
     put("area.usda", area_text(product, &tiles).as_bytes()).map_err(ExportError::write("area.usda"))
 }
@@ -96,7 +100,7 @@ fn corner(product: &Product, tile: &Tile) -> [i32; 2] {
     product.corner(terrain::ModuleId { row: tile.rect.south, col: tile.rect.west })
 }
 
-fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile) -> String {
+fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile, texture: Option<&Texture>) -> String {
     let parts = mesh.parts(product, tile.rect);
     let of_part = |(sheet, part): &(Sheet, Part)| {
         let sheet = *sheet;
@@ -109,13 +113,14 @@ fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile) 
     let mut text = format!("#usda 1.0\n(\n    defaultPrim = \"{root}\"\n{HEAD})\n\ndef Xform \"{root}\"\n{{\n");
     text.push_str("    def Scope \"Materials\"\n    {\n");
     for &material in &materials {
-        put_material(&mut text, product, root, material);
+        let photo = texture.filter(|_| material.sheet != Sheet::Objects).map(|_| format!("{root}.jpg"));
+        put_material(&mut text, product, root, material, photo.as_deref());
     }
     text.push_str("    }\n");
     let corner = corner(product, tile);
     for (sheet, part) in &parts {
         let draw = |text: &mut String, thing: Option<Thing>, part: &Part| {
-            put_mesh(text, &Drawn { product, mesh, normals, corner, root, sheet: *sheet, thing, part });
+            put_mesh(text, &Drawn { product, mesh, normals, texture, corner, root, sheet: *sheet, thing, part });
         };
         if *sheet != Sheet::Objects {
             draw(&mut text, None, part);
@@ -129,18 +134,37 @@ fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile) 
     text
 }
 
-fn put_material(text: &mut String, product: &Product, root: &str, material: Material) {
+/// A material, seen with the texture `photo` where there is one.
+fn put_material(text: &mut String, product: &Product, root: &str, material: Material, photo: Option<&str>) {
     let (name, [red, green, blue]) = (material_name(product, material), material.light(product.classes()));
+    let color = match photo {
+        Some(_) => format!("inputs:diffuseColor.connect = </{root}/Materials/{name}/Photo.outputs:rgb>"),
+        None => format!("inputs:diffuseColor = ({red}, {green}, {blue})"),
+    };
     let _ = write!(
         text,
         "        def Material \"{name}\"\n        {{\n            \
          token outputs:surface.connect = </{root}/Materials/{name}/Surface.outputs:surface>\n\n            \
          def Shader \"Surface\"\n            {{\n                \
          uniform token info:id = \"UsdPreviewSurface\"\n                \
-         color3f inputs:diffuseColor = ({red}, {green}, {blue})\n                \
+         color3f {color}\n                \
          float inputs:metallic = 0\n                float inputs:roughness = 1\n                \
-         token outputs:surface\n            }}\n        }}\n"
+         token outputs:surface\n            }}\n"
     );
+    if let Some(photo) = photo {
+        let _ = write!(
+            text,
+            "\n            def Shader \"Photo\"\n            {{\n                \
+             uniform token info:id = \"UsdUVTexture\"\n                asset inputs:file = @./{photo}@\n                \
+             float2 inputs:st.connect = </{root}/Materials/{name}/Places.outputs:result>\n                \
+             token inputs:wrapS = \"clamp\"\n                token inputs:wrapT = \"clamp\"\n                \
+             token inputs:sourceColorSpace = \"sRGB\"\n                float3 outputs:rgb\n            }}\n\n            \
+             def Shader \"Places\"\n            {{\n                \
+             uniform token info:id = \"UsdPrimvarReader_float2\"\n                \
+             string inputs:varname = \"st\"\n                float2 outputs:result\n            }}\n"
+        );
+    }
+    text.push_str("        }\n");
 }
 
 /// A mesh of a tile.
@@ -148,6 +172,7 @@ struct Drawn<'a> {
     product: &'a Product,
     mesh: &'a Mesh,
     normals: &'a [[f64; 3]],
+    texture: Option<&'a Texture>,
     corner: [i32; 2],
     root: &'a str,
     sheet: Sheet,
@@ -156,11 +181,13 @@ struct Drawn<'a> {
     part: &'a Part,
 }
 
+/// What is said of a list with an item for each vertex.
+const VERTEX: &str = " (\n            interpolation = \"vertex\"\n        )\n";
 /// What a mesh says of itself that bodies hit.
 const COLLIDES: &str = " (\n        prepend apiSchemas = [\"PhysicsCollisionAPI\", \"PhysicsMeshCollisionAPI\"]\n    )";
 
 fn put_mesh(text: &mut String, drawn: &Drawn) {
-    let Drawn { mesh, normals, corner: [west, south], sheet, thing, part, .. } = drawn;
+    let Drawn { mesh, normals, texture, corner: [west, south], sheet, thing, part, .. } = drawn;
     let places: Vec<[i32; 3]> = part
         .vertices
         .iter()
@@ -195,7 +222,14 @@ fn put_mesh(text: &mut String, drawn: &Drawn) {
     put_list(text, "normal3f[] normals", of_vertices);
     // The list ends its line; what is said of it follows in brackets.
     text.pop();
-    text.push_str(" (\n            interpolation = \"vertex\"\n        )\n");
+    text.push_str(VERTEX);
+    if let Some(texture) = texture.filter(|_| *sheet != Sheet::Objects) {
+        // From the southern side.
+        let places = mesh.uvs(texture, &part.vertices).into_iter().map(|[u, v]| format!("({u}, {})", 1.0 - v));
+        put_list(text, "texCoord2f[] primvars:st", places);
+        text.pop();
+        text.push_str(VERTEX);
+    }
     if collides {
         text.push_str(
             "        bool physics:collisionEnabled = 1\n        uniform token physics:approximation = \"none\"\n",

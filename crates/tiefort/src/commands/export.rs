@@ -6,7 +6,7 @@ use std::sync::Arc;
 use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
 use clap::{Args, ValueEnum};
-use exports::{Block, CARRIES, Carries, Datum, ExportError, Facts, Levels, Mesh, Product, Textures, Work};
+use exports::{Block, CARRIES, Carries, Datum, ExportError, Facts, LEFT_OUT, Levels, Mesh, Product, Textures, Work};
 use job::Job;
 use store::Folder;
 use terrain::{ModuleId, PostRect};
@@ -93,8 +93,8 @@ pub struct Arguments {
     /// Another name for a material, once for each: primary=asphalt, building_wall=plaster
     #[arg(long = "material", value_name = "MATERIAL=NAME", value_parser = material)]
     materials: Vec<(String, String)>,
-    /// Orthophotos that the ground is seen with, later ones above earlier: GeoTIFF in any system; for glb, obj, 3dtiles
-    /// and 3tz
+    /// Orthophotos that the ground is seen with, later ones above earlier: GeoTIFF in any system; for the meshes of
+    /// scenes, as the table below says
     #[arg(long, value_name = "FILE", num_args = 1..)]
     imagery: Vec<PathBuf>,
     /// Metres of a texel, or more where its texture would be too large [default: that of the finest orthophoto]
@@ -289,9 +289,11 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
             "leave --assume-datum out; only 3dtiles, 3tz, quantized-mesh and mbtiles need it",
         ));
     }
-    let has_textures = matches!(arguments.format, Format::Glb | Format::Obj | Format::Tiles3d | Format::Archive);
+    let has_textures = arguments.format.carries().textures != LEFT_OUT;
     if !arguments.imagery.is_empty() && !has_textures {
-        let message = "found --imagery with a format that has no textures, expected glb, obj, 3dtiles or 3tz";
+        let with = CARRIES.iter().filter(|row| row.textures != LEFT_OUT).map(|row| row.format);
+        let expected = with.collect::<Vec<_>>().join(", ");
+        let message = format!("found --imagery with a format that has no textures, expected one of {expected}");
         return Err(Failure::new(message, "leave --imagery out, or choose one of these formats"));
     }
     let is_heightmap = arguments.format == Format::Heightmap;
