@@ -4,8 +4,11 @@
 /// The fraction of the golden ratio, as an odd number: how far SplitMix64 steps.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// One pair's numbers.
-pub(crate) struct Draw(u64);
+/// How often a pair that leaves the area is drawn again before it is left out.
+const DRAWS_MAX: u32 = 1000;
+
+/// The numbers of one pair, or of one place.
+pub struct Draw(u64);
 
 impl Draw {
     /// The numbers of a pair.
@@ -20,8 +23,31 @@ impl Draw {
         (mix(self.0) >> 11) as f64 / STEPS
     }
 
+    /// A place of a rectangle from 0 to its size, each as likely as any other: east, then north.
+    pub fn place(&mut self, [wide, high]: [f64; 2]) -> [f64; 2] {
+        [wide * self.unit(), high * self.unit()]
+    }
+
+    /// Two places of a rectangle from 0 to its size: the first anywhere, the second in any direction from it and at any
+    /// distance from `nearest` to `farthest`. `None` where none was found.
+    pub fn pair(&mut self, [wide, high]: [f64; 2], [nearest, farthest]: [f64; 2]) -> Option<[[f64; 2]; 2]> {
+        // Nothing farther than the diagonal fits, so leaving it out changes no chance, only how often we draw.
+        let farthest = farthest.min((wide * wide + high * high).sqrt());
+        if farthest < nearest {
+            return None;
+        }
+        (0..DRAWS_MAX).find_map(|_| {
+            let [x, y] = self.place([wide, high]);
+            let [east, north] = self.direction();
+            let range = nearest + (farthest - nearest) * self.unit();
+            let (to_x, to_y) = (x + range * east, y + range * north);
+            let is_inside = 0.0 <= to_x && to_x <= wide && 0.0 <= to_y && to_y <= high;
+            is_inside.then_some([[x, y], [to_x, to_y]])
+        })
+    }
+
     /// A direction, each as likely as any other: a point of the disc, moved to its rim. East, then north.
-    pub fn direction(&mut self) -> [f64; 2] {
+    fn direction(&mut self) -> [f64; 2] {
         /// Squared radius below which rounding would bend the direction.
         const HUB: f64 = 1e-6;
         loop {

@@ -42,6 +42,7 @@ pub use triangles::Triangles;
 mod posts;
 pub use posts::{PostHeights, residuals_at_posts, residuals_by_class};
 mod draw;
+pub use draw::Draw;
 mod samples;
 mod sight;
 pub use sight::{EYE_M, LineOfSight, Pair, RANGE_M, drawn_pairs, line_of_sight, sees_on};

@@ -18,8 +18,6 @@ use crate::triangles::Triangles;
 pub const EYE_M: f64 = 2.5;
 /// Nearest and farthest target, in metres.
 pub const RANGE_M: (f64, f64) = (200.0, 4000.0);
-/// How often a pair that leaves the area is drawn again before it is left out.
-const DRAWS_MAX: u32 = 1000;
 
 /// How often the two grounds agreed on what is seen: pairs of places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -122,22 +120,9 @@ pub fn drawn_pairs(rect: PostRect, spacing: Metres, pairs: u32, seed: u64) -> im
 
 /// A pair inside `rect`; `None` where none was found.
 fn draw_pair(rect: PostRect, spacing: Metres, mut draw: Draw) -> Option<Pair> {
-    let (wide, high) = (rect.cells_wide() as f64, rect.cells_high() as f64);
-    let nearest = RANGE_M.0 / spacing.0;
-    // Nothing farther than the diagonal fits, so leaving it out changes no chance, only how often we draw.
-    let farthest = (RANGE_M.1 / spacing.0).min((wide * wide + high * high).sqrt());
-    if farthest < nearest {
-        return None;
-    }
-    (0..DRAWS_MAX).find_map(|_| {
-        let (x, y) = (wide * draw.unit(), high * draw.unit());
-        let [east, north] = draw.direction();
-        let range = nearest + (farthest - nearest) * draw.unit();
-        let (to_x, to_y) = (x + range * east, y + range * north);
-        let is_inside = 0.0 <= to_x && to_x <= wide && 0.0 <= to_y && to_y <= high;
-        let place = |x: f64, y: f64| [x + f64::from(rect.west), y + f64::from(rect.south)];
-        is_inside.then(|| [place(x, y), place(to_x, to_y)])
-    })
+    let size = [rect.cells_wide() as f64, rect.cells_high() as f64];
+    let pair = draw.pair(size, [RANGE_M.0, RANGE_M.1].map(|range_m| range_m / spacing.0))?;
+    Some(pair.map(|[x, y]| [x + f64::from(rect.west), y + f64::from(rect.south)]))
 }
 
 /// Places along a pair's line at most half a post apart, with the share of the way; both ends are among them.
