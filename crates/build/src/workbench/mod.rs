@@ -19,6 +19,8 @@ pub use source_files::is_feature_file;
 pub use vectors::{SeenFeatures, look_at_features};
 mod sample;
 pub use sample::Sample;
+mod surface;
+pub use surface::{PostHeights, SurfaceRaster, is_same_datum};
 
 mod heights;
 mod join;
