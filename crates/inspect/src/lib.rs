@@ -20,5 +20,11 @@ mod explain;
 pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
 mod difference;
 pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
+mod correlate;
+pub use correlate::{
+    ClassFigures, Confusion, CorrelateRequest, Correlation, Criterion, Demand, DifferenceMap, HeightFigures, Kappa,
+    NEAREST_M, Plan, SAMPLES_MAX, SIGHT_HEIGHTS_M, SLOPE_CLASSES, SLOPE_ENDS_DEGREES, Shift, SightFigures,
+    SlopeFigures, SurfaceFacts, correlate,
+};
 
 mod recount;

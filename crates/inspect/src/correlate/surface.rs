@@ -1,0 +1,233 @@
+//! The two surfaces: what each is, and its ground around a rectangle, held in memory and asked by place.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use build::CompileError;
+use build::ground::GroundError;
+use build::product::Opened;
+use build::workbench::{PostHeights, SurfaceRaster};
+use load_module_reader::{
+    Area, Block, Curvature, Keep, LoadedGround, PastObjects, ReadError, Sight, Standing, open_file,
+};
+use schedule::{ScheduleError, Workers};
+use store::{DatabaseError, Fingerprint};
+use terrain::TileId;
+
+use super::posts;
+
+/// What a surface is, as a certificate names it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceFacts {
+    /// The path that was given.
+    pub path: String,
+    /// Its kind: `terrain database`, or the format of a raster.
+    pub kind: String,
+    /// Name of the area of a database; empty of a raster.
+    pub name: String,
+    /// Its coordinate system, such as `EPSG:32611`.
+    pub crs: String,
+    /// What its heights are above; empty where that is unknown.
+    pub vertical_datum: String,
+    /// West, south, east and north of its ground, in metres.
+    pub extent_m: [f64; 4],
+    /// Metres between its posts, or those of the working grid it was built on, to the east and to the north.
+    pub spacing_m: [f64; 2],
+    /// Load modules of a database.
+    pub modules: Option<u64>,
+    /// Names of the classes of a database's ground, by number.
+    pub classes: Vec<String>,
+    /// Whether a database has buildings or woods.
+    pub has_objects: bool,
+    /// Fingerprint (BLAKE3) of `database.json`, which holds those of all load modules, or of the raster.
+    pub fingerprint: String,
+}
+
+/// A surface that is open.
+pub(super) struct Surface {
+    pub facts: SurfaceFacts,
+    source: Source,
+}
+
+enum Source {
+    Modules(Box<Area>),
+    Posts(Box<SurfaceRaster>),
+}
+
+/// The ground of a surface around a rectangle.
+pub(super) enum Ground {
+    Modules(Box<LoadedGround>),
+    Posts(PostHeights),
+    /// The surface has none there.
+    None,
+}
+
+impl Surface {
+    /// Opens a terrain database, which is a folder, or a raster of heights.
+    ///
+    /// # Errors
+    /// When it is missing, unfinished or damaged, or not in metres.
+    pub fn open(path: &Path) -> Result<Self, CompileError> {
+        if path.is_dir() { Self::database(path) } else { Self::raster(path) }
+    }
+
+    fn database(path: &Path) -> Result<Self, CompileError> {
+        let Opened { folder, manifest, job, area } = Opened::open(path)?;
+        let modules = Area::open(folder.dir(), Keep::OnDisk).map_err(|error| damaged(path, error))?;
+        let (frame, [west, south]) = (modules.frame(), modules.frame().origin_m);
+        let [wide, high] = [frame.cols, frame.rows].map(|count| f64::from(count) * frame.side_m());
+        let list = folder.path("database.json");
+        let bytes = open_file(&list).map_err(|error| damaged(&list, error))?;
+        let unreadable = |source| damaged(&list, ReadError::Unreadable { path: list.clone(), source });
+        let facts = SurfaceFacts {
+            path: path.display().to_string(),
+            kind: "terrain database".into(),
+            name: manifest.area.name.clone(),
+            crs: frame.crs.clone(),
+            vertical_datum: frame.vertical_datum.clone(),
+            extent_m: [west, south, west + wide, south + high],
+            spacing_m: [area.frame.spacing.metres(); 2],
+            modules: Some(u64::from(frame.rows) * u64::from(frame.cols)),
+            classes: job.class_names(),
+            has_objects: job.objects.is_some(),
+            fingerprint: Fingerprint::of_reader(bytes).map_err(unreadable)?.to_string(),
+        };
+        Ok(Self { facts, source: Source::Modules(Box::new(modules)) })
+    }
+
+    fn raster(path: &Path) -> Result<Self, CompileError> {
+        let raster = SurfaceRaster::open(path)?;
+        let facts = SurfaceFacts {
+            path: path.display().to_string(),
+            kind: raster.format().into(),
+            name: String::new(),
+            crs: raster.crs(),
+            vertical_datum: raster.vertical_datum(),
+            extent_m: raster.extent_m(),
+            spacing_m: raster.spacing_m(),
+            modules: None,
+            classes: Vec::new(),
+            has_objects: false,
+            fingerprint: raster.fingerprint()?.to_string(),
+        };
+        Ok(Self { facts, source: Source::Posts(Box::new(raster)) })
+    }
+
+    /// Bytes, about, that the ground of a square of a side in metres takes in memory.
+    pub fn bytes_of(&self, side_m: f64) -> f64 {
+        const MODULE_BYTES: f64 = 12e3;
+        const POST_BYTES: f64 = 4.0;
+        let (apart_m, bytes) = match &self.source {
+            Source::Modules(area) => ([area.frame().side_m(); 2], MODULE_BYTES),
+            Source::Posts(raster) => (raster.spacing_m(), POST_BYTES),
+        };
+        let [west, south, east, north] = self.facts.extent_m;
+        (side_m.min(east - west) / apart_m[0] + 1.0) * (side_m.min(north - south) / apart_m[1] + 1.0) * bytes
+    }
+
+    /// The ground around a rectangle, which is west, south, east and north in metres.
+    ///
+    /// # Errors
+    /// When a load module or the raster is damaged, or it was asked to stop.
+    pub fn load(&self, rect_m: [f64; 4], workers: &Workers, stop: &AtomicBool) -> Result<Ground, CompileError> {
+        match &self.source {
+            Source::Posts(raster) => Ok(raster.window(rect_m, workers, stop)?.map_or(Ground::None, Ground::Posts)),
+            Source::Modules(area) => {
+                let [south_west, north_east] = [[rect_m[0], rect_m[1]], [rect_m[2], rect_m[3]]];
+                let [first, last] = [south_west, north_east].map(|corner| area.frame().module_at(corner));
+                let cut = |at: i64, count: u32| at.clamp(0, i64::from(count)) as u32;
+                let block = Block {
+                    south: cut(first[0], area.frame().rows),
+                    west: cut(first[1], area.frame().cols),
+                    north: cut(last[0].saturating_add(1), area.frame().rows),
+                    east: cut(last[1].saturating_add(1), area.frame().cols),
+                };
+                let read = |error| damaged(Path::new(&self.facts.path), error);
+                Ok(Ground::Modules(Box::new(load_rows(area, block, workers, stop, read)?)))
+            }
+        }
+    }
+}
+
+/// A block, row by row of load modules on all workers.
+fn load_rows(
+    area: &Area,
+    block: Block,
+    workers: &Workers,
+    stop: &AtomicBool,
+    read: impl Fn(ReadError) -> CompileError + Sync,
+) -> Result<LoadedGround, CompileError> {
+    if block.count() == 0 {
+        return area.load(block).map_err(read);
+    }
+    let rows: Vec<u32> = (block.south..block.north).collect();
+    let load = |_: usize, &row: &u32| area.load(Block { south: row, north: row + 1, ..block }).map_err(&read);
+    let rows = schedule::for_each_independent(&rows, workers, stop, load).map_err(ended)?;
+    let modules = rows.iter().flat_map(|row| row.modules().iter().cloned()).collect();
+    Ok(LoadedGround::of_modules(area.frame().clone(), 0, block, modules))
+}
+
+/// Why work on all workers ended early.
+pub(super) fn ended<R>(error: ScheduleError<R, CompileError>) -> CompileError {
+    match error {
+        ScheduleError::Failed { error, .. } => error,
+        // No tile is at work here: it is the first that is named.
+        ScheduleError::Panicked { message, .. } => {
+            GroundError::Panicked { tile: TileId { row: 0, col: 0 }, message }.into()
+        }
+        ScheduleError::Stopped { done, tasks } => GroundError::Stopped { done: done.len(), total: tasks }.into(),
+        ScheduleError::NoThread { message, .. } => GroundError::NoThread { found: message }.into(),
+    }
+}
+
+fn damaged(path: &Path, error: ReadError) -> CompileError {
+    DatabaseError::Modules { path: path.into(), fault: Box::new(error) }.into()
+}
+
+impl Ground {
+    /// Height at a place, an easting and a northing, in metres; `None` in a hole, over a void post, and outside.
+    pub fn height_m(&self, place_m: [f64; 2]) -> Option<f64> {
+        match self {
+            Self::Modules(ground) => ground.sample(place_m).filter(|sample| !sample.is_hole()).map(|at| at.height_m),
+            Self::Posts(posts) => posts::height_m(posts, place_m),
+            Self::None => None,
+        }
+    }
+
+    /// Number of the class of the ground at a place; `None` where it has none.
+    pub fn class(&self, place_m: [f64; 2]) -> Option<u8> {
+        match self {
+            Self::Modules(ground) => ground.sample(place_m).filter(|sample| !sample.is_hole()).map(|at| at.class),
+            Self::Posts(_) | Self::None => None,
+        }
+    }
+
+    /// Metres up for each metre east and north at a place, between places half of `apart_m` away on either side.
+    pub fn gradient(&self, place_m: [f64; 2], apart_m: f64) -> Option<[f64; 2]> {
+        let at = |east: f64, north: f64| self.height_m([place_m[0] + east, place_m[1] + north]);
+        let half = 0.5 * apart_m;
+        Some([(at(half, 0.0)? - at(-half, 0.0)?) / apart_m, (at(0.0, half)? - at(0.0, -half)?) / apart_m])
+    }
+
+    /// Whether one place sees another, both the same metres above this ground; `None` where an end has no ground, or
+    /// the line leaves what has a height.
+    pub fn sees(&self, pair: [[f64; 2]; 2], above_m: f64, standing: Standing) -> Option<bool> {
+        let [from, to] = [0, 1].map(|end| {
+            let [east, north] = pair[end];
+            self.height_m([east, north]).map(|height_m| [east, north, height_m + above_m])
+        });
+        let (from, to) = (from?, to?);
+        match self {
+            Self::Modules(ground) => {
+                let past = PastObjects { standing, ..PastObjects::all(Curvature::NONE) };
+                match ground.sight_past(from, to, &past).sight {
+                    Sight::Free => Some(true),
+                    Sight::Hidden(_) => Some(false),
+                    Sight::Unknown => None,
+                }
+            }
+            Self::Posts(posts) => posts::is_free(posts, from, to),
+            Self::None => None,
+        }
+    }
+}
