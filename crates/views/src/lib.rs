@@ -15,7 +15,9 @@ mod features_text;
 mod objects_text;
 pub use features::{features_geojson, outcome};
 pub use features_text::{far_off_in_words, remarks_in_words};
+mod certificate;
 mod page;
+pub use certificate::{Certificate, CertificateMap, CertificateSection, certificate_html, certificate_text};
 pub use page::{Advice, Page, PageSetting, advise, report_html};
 mod picture;
 pub use picture::{

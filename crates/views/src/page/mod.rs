@@ -10,6 +10,7 @@ mod tables;
 
 pub(crate) use advice::place_text;
 pub use advice::{Advice, advise};
+pub(crate) use tables::table;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use store::{Manifest, Report};

@@ -51,7 +51,7 @@ pub(super) fn in_the_ground(features: &ReportFeatures) -> Markup {
 }
 
 /// A table that scrolls by itself where it is wider than the screen, and repeats its head where it goes on on paper.
-pub(super) fn table(head: Markup, rows: Markup) -> Markup {
+pub(crate) fn table(head: Markup, rows: Markup) -> Markup {
     html! { div.wide tabindex="0" { table { thead { tr { (head) } } tbody { (rows) } } } }
 }
 
