@@ -165,6 +165,12 @@ pub fn compare_on_array(
     })
 }
 
+/// How well two surfaces agree, as JSON, with the words of `tiefort correlate`.
+#[pyfunction]
+pub fn correlate(py: Python<'_>, words: Vec<OsString>) -> PyResult<String> {
+    wait(py, None, move |stop, _| library::correlate(words, stop))
+}
+
 /// Everything there is to know about one load module, as JSON.
 #[pyfunction]
 pub fn explain(py: Python<'_>, folder: PathBuf, id: (u32, u32), against: Option<PathBuf>) -> PyResult<String> {

@@ -23,7 +23,7 @@ mod _tiefort {
     #[pymodule_export]
     use crate::command::command_line;
     #[pymodule_export]
-    use crate::jobs::{Job, build, compare, compare_on_array, explain, export, plan, tile, verify};
+    use crate::jobs::{Job, build, compare, compare_on_array, correlate, explain, export, plan, tile, verify};
     #[pymodule_export]
     use crate::meshes::{Tin, tin_of_array, tin_of_file};
     #[pymodule_export]

@@ -189,6 +189,14 @@ def test_methods_are_compared(tmp_path: Path) -> None:
         tiefort.compare(tmp_path / "dem.tif", crs="EPSG:32611")
 
 
+def test_a_database_agrees_with_itself(database: Path, tmp_path: Path) -> None:
+    found = tiefort.correlate(database, database, range_m=500, page=tmp_path / "certificate.html")
+    assert found["accepted"] and found["heights"]["largest_m"] == 0 and found["causes"] == []
+    assert "BLAKE3" in (tmp_path / "certificate.html").read_text(encoding="utf-8")
+    with pytest.raises(tiefort.RequestError, match="samples: 20, expected 59 at least"):
+        tiefort.correlate(database, database, samples=20)
+
+
 def without_seconds(found: dict[str, Any]) -> list[dict[str, Any]]:
     return [{key: value for key, value in row.items() if key != "seconds"} for row in found["rows"]]
 

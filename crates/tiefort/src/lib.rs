@@ -16,8 +16,10 @@
 
 mod arguments;
 mod board;
+mod certificate;
 mod clock;
 mod commands;
+mod correlation_json;
 mod costs;
 mod end_table;
 mod engines;

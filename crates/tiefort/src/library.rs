@@ -16,7 +16,7 @@ use store::Report;
 use terrain::{ModuleId, TileId};
 
 pub use crate::clock::SystemClock;
-use crate::commands::{budgets, compare, explain, export, plan, tile, tin};
+use crate::commands::{budgets, compare, correlate, explain, export, plan, tile, tin};
 pub use crate::failure::{Cause, Failure};
 use crate::{files, fit, resources};
 
@@ -103,6 +103,14 @@ pub fn export(words: Vec<OsString>, stop: &AtomicBool) -> Result<String, Failure
 pub fn compare(words: Vec<OsString>, ground: Option<HeldGround>, stop: &AtomicBool) -> Result<String, Failure> {
     let arguments: compare::Arguments = read(words.into_iter().chain(["--quiet".into()]))?;
     compare::json_text(&arguments, ground, stop)
+}
+
+/// What `tiefort correlate --format json` prints with these words.
+///
+/// # Errors
+/// When the words do not fit together, or there is nothing to compare.
+pub fn correlate(words: Vec<OsString>, stop: &AtomicBool) -> Result<String, Failure> {
+    correlate::json_text(&read(words)?, stop)
 }
 
 /// Whether a file can be made at `path`.

@@ -32,6 +32,15 @@ pub fn standing(text: &str) -> Result<Standing, String> {
     Standing::named(text).ok_or_else(|| "expected none, buildings or all".into())
 }
 
+/// The word that [`standing`] reads.
+pub fn standing_word(standing: Standing) -> &'static str {
+    match standing {
+        Standing::None => "none",
+        Standing::Buildings => "buildings",
+        Standing::All => "all",
+    }
+}
+
 /// So many finite numbers, with commas between.
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let all: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();

@@ -317,3 +317,44 @@ def compare(
         posts = posts_of(ground, crs, transform, spacing_m, nodata)
         told = json.loads(_tiefort.compare_on_array(posts.array, posts.placed, ["array", *words]))
     return told
+
+
+def correlate(
+    a: Path,
+    b: Path,
+    *,
+    accept: float = 0.95,
+    risk: float = 0.05,
+    within_m: float = 1.0,
+    slope_within_degrees: float = 5.0,
+    samples: int | None = None,
+    range_m: float = 3000.0,
+    objects: str = "all",
+    seed: int = 1,
+    allow_datums: bool = False,
+    page: Path | None = None,
+) -> dict[str, Any]:
+    """Tell how well two databases, or a database and a raster of heights, agree: for a fair fight of two simulators.
+
+    Keys are those of ``tiefort correlate --format json``: ``accepted`` and ``causes`` first of all. With ``page``, the
+    certificate is also written there, as HTML.
+    """
+    words = [
+        path_of(a),
+        path_of(b),
+        f"--accept={accept}",
+        f"--risk={risk}",
+        f"--within={within_m}",
+        f"--slope-within={slope_within_degrees}",
+        f"--range={range_m}",
+        f"--objects={objects}",
+        f"--seed={operator.index(seed)}",
+    ]
+    if samples is not None:
+        words.append(f"--samples={operator.index(samples)}")
+    if allow_datums:
+        words.append("--allow-datums")
+    if page is not None:
+        words.append(f"--page={path_of(page)}")
+    told: dict[str, Any] = json.loads(_tiefort.correlate(words))
+    return told

@@ -4,6 +4,7 @@ pub mod budgets;
 mod build;
 pub mod compare;
 mod completions;
+pub mod correlate;
 mod diff;
 pub mod explain;
 pub mod export;
@@ -67,6 +68,8 @@ pub enum Command {
     Explain(explain::Arguments),
     /// List the load modules in which two databases differ, and by how much
     Diff(diff::Arguments),
+    /// Certify how well two databases, or a database and a raster, agree: heights, slopes, lines of sight
+    Correlate(correlate::Arguments),
     /// Check every file and every load module of a database
     Verify(verify::Arguments),
     /// Measure how true a database is: residuals, line of sight, slope
@@ -109,6 +112,7 @@ impl Command {
             Command::Profile(arguments) => profile::run(&arguments),
             Command::Explain(arguments) => explain::run(&arguments),
             Command::Diff(arguments) => diff::run(&arguments),
+            Command::Correlate(arguments) => correlate::run(&arguments),
             Command::Verify(arguments) => verify::run(&arguments),
             Command::Fidelity(arguments) => fidelity::run(&arguments),
             Command::Export(arguments) => export::run(&arguments),

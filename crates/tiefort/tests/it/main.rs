@@ -8,6 +8,7 @@ mod bad_jobs;
 mod builds;
 mod columns;
 mod comparing;
+mod correlating;
 mod documents;
 mod exports;
 mod features;

@@ -35,6 +35,16 @@ impl Raster {
         Self { posts, spacing_m: 25.0, corner_m: [505_000.0, 3_877_000.0], keys: UTM, nodata: None, heights }
     }
 
+    /// Four square kilometres of the same place, and half a kilometre around them, 25 m apart: what `height_m` says at
+    /// each easting and northing.
+    pub fn around(height_m: impl Fn(f64, f64) -> f64) -> Self {
+        let (posts, spacing_m, corner_m) = (121, 25.0, [504_500.0, 3_877_500.0]);
+        let place = |index: u32| [index % posts, index / posts].map(|step| f64::from(step) * spacing_m);
+        let height = |[x, y]: [f64; 2]| height_m(corner_m[0] + x, corner_m[1] - y) as f32;
+        let heights = (0..posts * posts).map(|index| height(place(index))).collect();
+        Self { posts, spacing_m, corner_m, keys: UTM, nodata: None, heights }
+    }
+
     pub fn without_crs(self) -> Self {
         Self { keys: &[], ..self }
     }
