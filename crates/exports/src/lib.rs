@@ -58,6 +58,7 @@ mod openflight;
 pub use openflight::write_openflight;
 mod coarse;
 mod globe;
+mod triangle_index;
 mod tiles3d;
 pub use tiles3d::{Tileset, write_3dtiles};
 mod quantized;

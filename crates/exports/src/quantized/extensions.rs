@@ -19,7 +19,7 @@ impl WaterMask {
     }
 
     /// A tile in whose cells, by column from the west and row from the south, `is_water` tells.
-    pub(crate) fn of(is_water: impl Fn(i64, i64) -> bool) -> Self {
+    pub(crate) fn of(mut is_water: impl FnMut(i64, i64) -> bool) -> Self {
         let rows = (0..CELLS).rev();
         Self(rows.flat_map(|row| (0..CELLS).map(move |col| (col, row))).map(|(col, row)| is_water(col, row)).collect())
     }

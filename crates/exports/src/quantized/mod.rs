@@ -16,11 +16,11 @@ use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
-use terrain::{LoadModule, ModuleId, QUANTA_PER_METRE};
 
 use crate::earth::{Earth, directions, earth_centred};
 use crate::globe::Globe;
 use crate::mesh::{Mesh, cross, minus, unit};
+use crate::triangle_index::TriangleIndex;
 use crate::{Datum, ExportError, Product, Put, Work};
 use collar::{GlobeMesh, with_collar};
 use extensions::{CELLS, WaterMask};
@@ -184,13 +184,10 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
     }
 
     /// Whether there is water at a longitude and latitude.
-    fn is_water_at(&self, place: [f64; 2]) -> bool {
+    fn is_water_at(&self, index: &mut TriangleIndex, place: [f64; 2]) -> bool {
         let product: &Product = self.product.borrow();
-        let rect = product.rect;
-        let (low, high) = (product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east));
-        let inside = |place: &[f64; 2]| (0..2).all(|axis| low[axis] <= place[axis] && place[axis] < high[axis]);
-        let place = self.earth.place_m(place).filter(inside);
-        place.and_then(|place| class_at(product, place)).is_some_and(|class| product.water.contains(&class))
+        let ground = self.earth.place_m(place).and_then(|place| index.at(place));
+        ground.is_some_and(|ground| product.water.contains(&ground.class))
     }
 
     /// What a tile says of the tiles below it, down to the next that says so.
@@ -242,26 +239,28 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
             .flat_map(|j| (-1..=GRID + 1).map(move |i| (i, j)))
             .map(|(i, j)| lon_lat(level, [at(col, i), at(row, j)]))
             .collect();
-        let heights: Vec<f64> = samples.iter().map(|&place| self.height_at(place)).collect();
+        let mut index = TriangleIndex::new(self.product.borrow());
+        let heights: Vec<f64> = samples.iter().map(|&place| self.height_at(&mut index, place)).collect();
         let wide = (GRID + 3) as usize;
-        let index = |i: i64, j: i64| (j + 1) as usize * wide + (i + 1) as usize;
+        let number = |i: i64, j: i64| (j + 1) as usize * wide + (i + 1) as usize;
         let place = |i: i64, j: i64| {
-            let [longitude, latitude] = samples[index(i, j)];
-            earth_centred([longitude, latitude.clamp(-90.0, 90.0)], heights[index(i, j)])
+            let [longitude, latitude] = samples[number(i, j)];
+            earth_centred([longitude, latitude.clamp(-90.0, 90.0)], heights[number(i, j)])
         };
         let node = |i: i64, j: i64| {
             let across = cross(minus(place(i + 1, j), place(i - 1, j)), minus(place(i, j + 1), place(i, j - 1)));
             let level_ground = across == [0.0; 3];
-            let normal = if level_ground { directions(samples[index(i, j)])[2] } else { unit(across) };
-            Node { x: at(col, i), y: at(row, j), h: height_steps(heights[index(i, j)]), normal }
+            let normal = if level_ground { directions(samples[number(i, j)])[2] } else { unit(across) };
+            Node { x: at(col, i), y: at(row, j), h: height_steps(heights[number(i, j)]), normal }
         };
         let mut tile = Tile::new(level, col, row);
         for (i, j) in (0..GRID).flat_map(|j| (0..GRID).map(move |i| (i, j))) {
             tile.add(&[node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]);
         }
         let middle = |tile: i64, cell: i64| tile * STEPS + (2 * cell + 1) * STEPS / (2 * CELLS);
-        let is_water = |i: i64, j: i64| self.is_water_at(lon_lat(level, [middle(col, i), middle(row, j)]));
-        tile.water = self.has_water().then(|| WaterMask::of(is_water));
+        let mut is_water =
+            |i: i64, j: i64| self.is_water_at(&mut index, lon_lat(level, [middle(col, i), middle(row, j)]));
+        tile.water = self.has_water().then(|| WaterMask::of(&mut is_water));
         tile
     }
 
@@ -271,7 +270,7 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
     }
 
     /// Height above the ellipsoid at a longitude and latitude, on what is exported or around it.
-    fn height_at(&self, place: [f64; 2]) -> f64 {
+    fn height_at(&self, index: &mut TriangleIndex, place: [f64; 2]) -> f64 {
         let product: &Product = self.product.borrow();
         let rect = product.rect;
         let (low, high) = (product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east));
@@ -283,7 +282,7 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
             return self.foot_m;
         }
         let inside = [0, 1].map(|axis| place[axis].clamp(low[axis], high[axis]));
-        let height = height_m(product, inside).unwrap_or(0.0);
+        let height = index.at(inside).map_or(0.0, |ground| ground.height_m);
         let above = self.earth.lon_lat(inside).map_or(0.0, |place| self.earth.datum_m(place));
         self.fallen(height + above, outside_m)
     }
@@ -398,52 +397,6 @@ fn collar_m(product: &Product, earth: &Earth, bounds: &Bounds, level: u32) -> Re
         }
     }
     Ok(collar_m)
-}
-
-/// Height of the triangles at an easting and northing of a product, in metres above its datum.
-fn height_m(product: &Product, place_m: [f64; 2]) -> Option<f64> {
-    let (module, place) = module_at(product, place_m)?;
-    triangle_at(module, place).map(|(_, height)| height)
-}
-
-/// Class of the triangle at an easting and northing of a product.
-fn class_at(product: &Product, place_m: [f64; 2]) -> Option<u8> {
-    let (module, place) = module_at(product, place_m)?;
-    triangle_at(module, place).map(|(triangle, _)| module.classes[triangle])
-}
-
-/// The load module at an easting and northing, and the place in it in quanta.
-fn module_at(product: &Product, [east_m, north_m]: [f64; 2]) -> Option<(&LoadModule, [f64; 2])> {
-    let rect = product.rect;
-    let index = |metres: f64, first: u32, last: u32| ((metres / product.side_m()) as u32).clamp(first, last);
-    let (x, y) = (east_m - product.frame.origin_east_m, north_m - product.frame.origin_north_m);
-    let id = ModuleId { row: index(y, rect.south, rect.north - 1), col: index(x, rect.west, rect.east - 1) };
-    let corner = [f64::from(id.col) * product.side_m(), f64::from(id.row) * product.side_m()];
-    let quanta = f64::from(QUANTA_PER_METRE);
-    Some((product.module(id)?, [(x - corner[0]) * quanta, (y - corner[1]) * quanta]))
-}
-
-/// The triangle at a place in quanta, or the one next to it, and its height there.
-fn triangle_at(module: &LoadModule, [x, y]: [f64; 2]) -> Option<(usize, f64)> {
-    let mut best = (f64::NEG_INFINITY, None);
-    for (number, triangle) in module.triangles.iter().enumerate() {
-        let [a, b, c] = triangle.map(|v| {
-            let v = module.vertices[usize::from(v)];
-            [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
-        });
-        let left = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
-        let shares = [left(b, c), left(c, a), left(a, b)];
-        let whole: f64 = shares.iter().sum();
-        let least = shares.iter().fold(f64::INFINITY, |least, share| least.min(share / whole));
-        if best.0 < least {
-            let height = (a[2] * shares[0] + b[2] * shares[1] + c[2] * shares[2]) / whole;
-            best = (least, Some((number, height / f64::from(QUANTA_PER_METRE))));
-        }
-        if 0.0 <= least {
-            break;
-        }
-    }
-    best.1
 }
 
 #[cfg(test)]
