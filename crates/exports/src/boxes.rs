@@ -64,7 +64,7 @@ fn area(ring: &[[f64; 2]]) -> f64 {
 }
 
 /// Middle, size and direction of the least rectangle around a ring that lies along one of its edges.
-fn least_rectangle(ring: &[[f64; 2]]) -> Option<([f64; 2], [f64; 2], f64)> {
+pub(crate) fn least_rectangle(ring: &[[f64; 2]]) -> Option<([f64; 2], [f64; 2], f64)> {
     let along = |(a, b): (&[f64; 2], &[f64; 2])| {
         let turned = (b[1] - a[1]).atan2(b[0] - a[0]);
         let (sine, cosine) = turned.sin_cos();

@@ -37,14 +37,14 @@ const POINTS: Layer = Layer {
 
 /// An object whose pieces are put together.
 #[derive(Default)]
-struct Whole {
+pub(crate) struct Whole {
     /// Of all pieces, in quanta from the south-west corner of what is exported.
-    rings: Vec<Vec<[i32; 2]>>,
+    pub rings: Vec<Vec<[i32; 2]>>,
     /// Of prisms alone, as the roof.
-    base: Option<i32>,
-    roof: Option<i32>,
+    pub base: Option<i32>,
+    pub roof: Option<i32>,
     /// Of canopies alone.
-    height: Option<i32>,
+    pub height: Option<i32>,
     fullness: Option<f64>,
     spacing: Option<f64>,
 }
@@ -95,7 +95,7 @@ fn layer_of(kind: ObjectKind) -> &'static Layer {
 }
 
 /// All objects by kind and number.
-fn wholes(product: &Product) -> BTreeMap<(ObjectKind, u64), Whole> {
+pub(crate) fn wholes(product: &Product) -> BTreeMap<(ObjectKind, u64), Whole> {
     let mut wholes: BTreeMap<(ObjectKind, u64), Whole> = BTreeMap::new();
     for module in &product.modules {
         for prism in &module.objects.prisms {

@@ -1,47 +1,23 @@
 //! Heightmaps of 16 bits for game engines: square tiles that share their border rows, with one scale of heights for
-//! all, and a JSON with the numbers that the engine's import dialog asks for.
+//! all; a map of weights for each class on the same samples; what stands on the ground as placements; and a JSON with
+//! the numbers that the engine's import dialog asks for.
 //!
-//! Samples are the posts of the working grid, with the exact height of the compiled surface there; over holes, where no
-//! source has a height, that of the triangles which close them. Beyond the area the heights of its border go on, since
-//! tiles have sizes of the engine's own.
+//! Tiles have sizes of the engine's own, so samples divide the area evenly from border to border, no farther apart than
+//! the posts of the working grid. Each has the height of the compiled surface at its place; over holes, where no source
+//! has a height, that of the triangles which close them.
+
+mod engine;
+mod placements;
+mod samples;
 
 use serde_json::{Value, json};
-use terrain::geometry::Facet;
-use terrain::geometry::owned::{OwnedRows, PostGrid};
-use terrain::{HOLE_CLASS, LoadModule, PostRect, QUANTA_PER_METRE};
+use terrain::HOLE_CLASS;
 
+use crate::classes::HOLE_NAME;
 use crate::{ExportError, Product, Put, Work};
-
-/// Whose import the tiles are for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Engine {
-    /// PNG, the northern row first; tiles count from the north-west.
-    Unreal,
-    /// RAW, little-endian, the southern row first; tiles count from the south-west.
-    Unity,
-}
-
-impl Engine {
-    /// The sides of a tile that the engine takes, in samples.
-    pub fn sizes(self) -> &'static [usize] {
-        match self {
-            Engine::Unreal => &[505, 1009, 2017, 4033, 8129],
-            Engine::Unity => &[33, 65, 129, 257, 513, 1025, 2049, 4097],
-        }
-    }
-
-    /// The least size with which one tile holds so many samples a side; else the one that is handled well.
-    fn size_for(self, samples: usize) -> usize {
-        let many = match self {
-            Engine::Unreal => 2017,
-            Engine::Unity => 2049,
-        };
-        self.sizes().iter().copied().find(|&size| samples <= size).unwrap_or(many)
-    }
-}
-
-/// Steps of height that 16 bits count.
-const STEPS: f64 = 65_535.0;
+pub use engine::Engine;
+use placements::placements;
+use samples::{Off, Samples};
 
 /// Writes a tile for each square of `size` samples, or of the size that suits the area, and `heightmap.json`.
 ///
@@ -63,190 +39,215 @@ pub fn write_heightmap(
             hint: "the engine imports these sizes only; leave --size out for the one that suits the area".into(),
         });
     }
-    let raster = sample(product, work)?;
-    let size = size.unwrap_or_else(|| engine.size_for(raster.wide.max(raster.high())));
-    let tiles = [raster.wide, raster.high()].map(|samples| (samples - 1).div_ceil(size - 1).max(1));
-    let numbers: Vec<[usize; 2]> = (0..tiles[1]).flat_map(|y| (0..tiles[0]).map(move |x| [x, y])).collect();
-    let scale = Scale::of(&raster.heights);
-    let files = work.each("tiles", &numbers, |&[x, y]| {
-        let samples = tile(&raster, &scale, engine, size, [x, y]);
-        let extension = if engine == Engine::Unreal { "png" } else { "raw" };
-        let name = format!("{}_x{x}_y{y}.{extension}", file_stem(&product.manifest.area.name));
-        let bytes = match engine {
-            Engine::Unreal => png_of(size, &samples).map_err(ExportError::write(&name))?,
-            Engine::Unity => samples.iter().flat_map(|sample| sample.to_le_bytes()).collect(),
-        };
-        put(&name, &bytes).map_err(ExportError::write(&name))?;
-        Ok(name)
+    let layout = Layout::of(product, engine, size);
+    let samples = Samples::of(product, layout.samples(), work)?;
+    let off = samples.off(product, work)?;
+    let layers = layers(product, &samples);
+    let files = work.each("tiles", &layout.numbers(), |&number| write_tile(product, &layout, &samples, number, put))?;
+    work.each("maps of weights", &layers, |layer| {
+        for number in layout.numbers() {
+            let name = layer_file(product, layer, number);
+            let weights = layout.tile(number, true, |at| if samples.classes[at] == layer.class { u8::MAX } else { 0 });
+            let bytes = png_of(layout.size, png::BitDepth::Eight, &weights).map_err(ExportError::write(&name))?;
+            put(&name, &bytes).map_err(ExportError::write(&name))?;
+        }
+        Ok(())
     })?;
-    let about = about(product, &raster, &scale, engine, size, &files);
+    let mut about = about(product, &layout, &samples, off);
+    about["tiles"] = json!(files);
+    if !layers.is_empty() {
+        about["weights"] = weights_told(product, &layout, &layers);
+    }
+    if let Some(text) = placements(product, engine) {
+        about["objects"] = placements::told(engine);
+        put(placements::FILE, text.as_bytes()).map_err(ExportError::write(placements::FILE))?;
+    }
     put("heightmap.json", format!("{about:#}\n").as_bytes()).map_err(ExportError::write("heightmap.json"))
 }
 
-/// Heights of the surface at posts in metres, row by row from the south.
-struct Samples {
-    wide: usize,
-    heights: Vec<f64>,
-    /// How many of them lie over holes.
-    holes: usize,
+/// How the area is divided into tiles and samples.
+struct Layout {
+    engine: Engine,
+    /// Samples along a side of a tile.
+    size: usize,
+    /// Tiles from west to east, and from south to north.
+    tiles: [usize; 2],
+    /// Metres between samples, likewise.
+    spacing_m: [f64; 2],
 }
 
-impl Samples {
-    fn high(&self) -> usize {
-        self.heights.len() / self.wide
+impl Layout {
+    fn of(product: &Product, engine: Engine, size: Option<usize>) -> Self {
+        let posts = product.grid.posts_of_rect(product.rect);
+        let posts = [posts.posts_wide(), posts.posts_high()];
+        let size = size.unwrap_or_else(|| engine.size_for(posts[0].max(posts[1])));
+        let tiles = posts.map(|count| (count - 1).div_ceil(size - 1).max(1));
+        let post_m = product.frame.spacing.metres();
+        let spacing_m = [0, 1].map(|axis| (posts[axis] - 1) as f64 * post_m / (tiles[axis] * (size - 1)) as f64);
+        Self { engine, size, tiles, spacing_m }
     }
 
-    /// That at a row and column, or at the nearest of the area.
-    fn at(&self, row: usize, col: usize) -> f64 {
-        self.heights[row.min(self.high() - 1) * self.wide + col.min(self.wide - 1)]
-    }
-}
-
-fn sample(product: &Product, work: &Work) -> Result<Samples, ExportError> {
-    let posts = product.grid.posts_of_rect(product.rect);
-    let (wide, mut heights, mut holes) = (posts.posts_wide(), vec![0.0; posts.post_count()], 0);
-    let indices: Vec<usize> = (0..product.modules.len()).collect();
-    let rows = work.each("load modules", &indices, |&index| Ok(sample_module(product, &product.modules[index])))?;
-    for (place, height, is_hole) in rows.into_iter().flatten() {
-        heights[index_of(posts, wide, place)] = height;
-        holes += usize::from(is_hole);
-    }
-    Ok(Samples { wide, heights, holes })
-}
-
-fn index_of(posts: PostRect, wide: usize, [row, col]: [i32; 2]) -> usize {
-    (row - posts.south) as usize * wide + (col - posts.west) as usize
-}
-
-/// Every post that a load module owns, the height there, and whether it lies over a hole; on the far sides of what is
-/// exported, those on the line too.
-fn sample_module(product: &Product, module: &LoadModule) -> Vec<([i32; 2], f64, bool)> {
-    let far = |is_last: bool| is_last.then_some(product.grid.side_cells);
-    let posts = PostGrid {
-        origin: product.grid.posts_of(module.id).south_west(),
-        units_per_post: product.frame.spacing.quanta_per_post(),
-        far_row: far(module.id.row + 1 == product.rect.north),
-        far_col: far(module.id.col + 1 == product.rect.east),
-    };
-    let step = i64::from(posts.units_per_post);
-    let mut found = Vec::new();
-    for (&triangle, &class) in module.triangles.iter().zip(&module.classes) {
-        let corners = triangle.map(|v| module.vertices[usize::from(v)]);
-        let facet = Facet::new(corners.map(|v| i32::from(v.x)), corners.map(|v| i32::from(v.y)), corners.map(|v| v.z));
-        for (row, cols) in OwnedRows::new(&posts, &facet) {
-            for col in cols {
-                let east = facet.px * (i64::from(col) * step - i64::from(facet.x[0]));
-                let north = facet.py * (i64::from(row) * step - i64::from(facet.y[0]));
-                let quanta = f64::from(facet.z[0]) + (east + north) as f64 / facet.den as f64;
-                let place = [posts.origin.row + row, posts.origin.col + col];
-                found.push((place, quanta / f64::from(QUANTA_PER_METRE), class == HOLE_CLASS));
-            }
-        }
-    }
-    found
-}
-
-/// How heights become 16 bits: one scale for all tiles.
-struct Scale {
-    low_m: f64,
-    step_m: f64,
-}
-
-impl Scale {
-    fn of(heights: &[f64]) -> Self {
-        let low_m = heights.iter().copied().fold(f64::INFINITY, f64::min);
-        let high_m = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Ground of one height has any scale.
-        let step_m = if low_m < high_m { (high_m - low_m) / STEPS } else { 1.0 / f64::from(QUANTA_PER_METRE) };
-        Self { low_m, step_m }
+    /// Samples from west to east and from south to north; tiles share those on their borders.
+    fn samples(&self) -> [usize; 2] {
+        self.tiles.map(|count| count * (self.size - 1) + 1)
     }
 
-    fn steps(&self, height_m: f64) -> u16 {
-        ((height_m - self.low_m) / self.step_m).round().clamp(0.0, STEPS) as u16
+    /// Columns and rows of tiles, as the engine counts them.
+    fn numbers(&self) -> Vec<[usize; 2]> {
+        (0..self.tiles[1]).flat_map(|y| (0..self.tiles[0]).map(move |x| [x, y])).collect()
     }
-}
 
-/// The samples of a tile in the order of its file.
-fn tile(raster: &Samples, scale: &Scale, engine: Engine, size: usize, [x, y]: [usize; 2]) -> Vec<u16> {
-    let last_row = raster.high() - 1;
-    let sample = |line: usize, col: usize| {
-        let row = match engine {
-            // From the north; beyond the southern border the last row goes on.
-            Engine::Unreal => last_row.saturating_sub(line),
-            Engine::Unity => line,
+    /// The samples of a tile by their places in the raster, from its northern or its southern row on.
+    fn tile<T>(&self, [x, y]: [usize; 2], is_from_north: bool, of: impl Fn(usize) -> T) -> Vec<T> {
+        let [wide, high] = self.samples();
+        let south = match self.engine {
+            Engine::Unreal => high - 1 - (y + 1) * (self.size - 1),
+            Engine::Unity => y * (self.size - 1),
         };
-        scale.steps(raster.at(row, col))
-    };
-    let start = |number: usize| number * (size - 1);
-    (start(y)..start(y) + size).flat_map(|line| (start(x)..start(x) + size).map(move |col| sample(line, col))).collect()
+        let row = |line: usize| if is_from_north { south + self.size - 1 - line } else { south + line };
+        let west = x * (self.size - 1);
+        let places = (0..self.size).flat_map(|line| (0..self.size).map(move |col| row(line) * wide + west + col));
+        places.map(of).collect()
+    }
 }
 
-fn png_of(size: usize, samples: &[u16]) -> std::io::Result<Vec<u8>> {
+fn write_tile(
+    product: &Product,
+    layout: &Layout,
+    samples: &Samples,
+    number: [usize; 2],
+    put: &Put,
+) -> Result<String, ExportError> {
+    let is_png = layout.engine == Engine::Unreal;
+    let name = tile_name(product, "", number, if is_png { "png" } else { "raw" });
+    let heights = layout.tile(number, is_png, |at| samples.heights[at]);
+    let bytes: Vec<u8> = match layout.engine {
+        Engine::Unreal => {
+            let big_endian: Vec<u8> = heights.iter().flat_map(|height| height.to_be_bytes()).collect();
+            png_of(layout.size, png::BitDepth::Sixteen, &big_endian).map_err(ExportError::write(&name))?
+        }
+        Engine::Unity => heights.iter().flat_map(|height| height.to_le_bytes()).collect(),
+    };
+    put(&name, &bytes).map_err(ExportError::write(&name))?;
+    Ok(name)
+}
+
+/// A class that has a map of weights.
+struct Layer {
+    class: u8,
+    name: String,
+}
+
+/// The classes that any sample has, where there are several.
+fn layers(product: &Product, samples: &Samples) -> Vec<Layer> {
+    let mut is_there = [false; 256];
+    samples.classes.iter().for_each(|&class| is_there[usize::from(class)] = true);
+    let name = |class: u8| match class {
+        HOLE_CLASS => HOLE_NAME.to_owned(),
+        class => product.classes().material(product.classes().word(class)),
+    };
+    let there = (0..=u8::MAX).filter(|&class| is_there[usize::from(class)]);
+    let layers: Vec<Layer> = there.map(|class| Layer { class, name: name(class) }).collect();
+    if layers.len() < 2 { Vec::new() } else { layers }
+}
+
+fn layer_file(product: &Product, layer: &Layer, number: [usize; 2]) -> String {
+    format!("weights/{}", tile_name(product, &format!("_{}_{}", layer.class, layer.name), number, "png"))
+}
+
+fn weights_told(product: &Product, layout: &Layout, layers: &[Layer]) -> Value {
+    let layer = |layer: &Layer| {
+        let files: Vec<String> = layout.numbers().iter().map(|&number| layer_file(product, layer, number)).collect();
+        json!({ "class": layer.name, "files": files })
+    };
+    json!({
+        "is": "8 bits, the northern row first; 255 where a sample is of the class, else 0",
+        "layers": layers.iter().map(layer).collect::<Vec<_>>(),
+    })
+}
+
+fn png_of(size: usize, depth: png::BitDepth, samples: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size as u32, size as u32);
     encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.set_depth(depth);
     encoder.set_compression(png::Compression::Fast);
-    let big_endian: Vec<u8> = samples.iter().flat_map(|sample| sample.to_be_bytes()).collect();
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&big_endian)?;
+    writer.write_image_data(samples)?;
     writer.finish()?;
     Ok(bytes)
 }
 
-/// The name of an area where files of engines have only letters, digits, hyphens and underscores.
-fn file_stem(name: &str) -> String {
+/// The name of a file of an area, where files of engines have only letters, digits, hyphens and underscores.
+fn tile_name(product: &Product, of: &str, [x, y]: [usize; 2], extension: &str) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
-    let stem: String = name.chars().map(letter).collect();
-    if stem.is_empty() { "area".into() } else { stem }
+    let stem: String = product.manifest.area.name.chars().chain(of.chars()).map(letter).collect();
+    let stem = if product.manifest.area.name.is_empty() { format!("area{stem}") } else { stem };
+    format!("{stem}_x{x}_y{y}.{extension}")
 }
 
-fn about(product: &Product, raster: &Samples, scale: &Scale, engine: Engine, size: usize, files: &[String]) -> Value {
-    let spacing_m = product.frame.spacing.metres();
-    let side_m = (size - 1) as f64 * spacing_m;
-    let [west, south] = product.corner_m(product.rect.south, product.rect.west);
-    let [east, north] = product.corner_m(product.rect.north, product.rect.east);
-    let tiles_high = (raster.high() - 1).div_ceil(size - 1).max(1) as f64;
-    let import = match engine {
-        // 128 steps of 16 bits are 1 cm at a scale of 1 and 1 m at the usual 100; 32768 is height 0.
-        Engine::Unreal => json!({
-            "where": "Landscape mode, Import from File; with several tiles a World Partition level",
-            "scale_x": 100.0 * spacing_m, "scale_y": 100.0 * spacing_m, "scale_z": 100.0 * 128.0 * scale.step_m,
-            "location_z_cm": 100.0 * (scale.low_m + 32_768.0 * scale.step_m),
-            "resolution": size,
-            "axes": "X east, Y south; x0_y0 is the north-west tile",
-        }),
+/// The numbers of the engine's import dialog, by the names that it has for them.
+fn import(layout: &Layout, samples: &Samples) -> Value {
+    let (scale, size) = (samples.scale, layout.size);
+    match layout.engine {
+        Engine::Unreal => {
+            let section = if size == 8129 { 127 } else { 63 };
+            let components = (size - 1) / (2 * section);
+            json!({
+                "where": "Landscape mode, New, Import from File; with several tiles a World Partition level",
+                "Section Size": format!("{section}x{section} Quads"),
+                "Sections Per Component": "2x2 Sections",
+                "Number of Components": [components, components],
+                "Overall Resolution": [size, size],
+                // The dialog places the middle of the landscape. 128 steps of 16 bits are 1 cm at a scale of 1 and 1 m
+                // at the usual 100; 32768 is height 0.
+                "Location": { "X": 0.0, "Y": 0.0, "Z": 100.0 * (scale.low_m + 32_768.0 * scale.step_m) },
+                "Scale": {
+                    "X": 100.0 * layout.spacing_m[0],
+                    "Y": 100.0 * layout.spacing_m[1],
+                    "Z": 100.0 * 128.0 * scale.step_m,
+                },
+                "axes": "X east, Y south; x0_y0 is the north-west tile",
+            })
+        }
         // The importer divides by 2^16.
         Engine::Unity => json!({
-            "where": "Terrain Settings, Import Raw: depth Bit 16, byte order Windows, no vertical flip",
-            "resolution": size, "terrain_width": side_m, "terrain_length": side_m,
-            "terrain_height": 65_536.0 * scale.step_m, "position_y": scale.low_m,
-            "axes": "X east, Z north; x0_y0 is the south-west tile",
+            "where": "Terrain Settings, Import Raw",
+            "Depth": "Bit 16",
+            "Resolution": size,
+            "Byte Order": "Windows",
+            "Flip Vertically": false,
+            "Terrain Size": {
+                "X": (size - 1) as f64 * layout.spacing_m[0],
+                "Y": 65_536.0 * scale.step_m,
+                "Z": (size - 1) as f64 * layout.spacing_m[1],
+            },
+            "Position": { "X": 0.0, "Y": scale.low_m, "Z": 0.0 },
+            "axes": "X east, Z north; x0_y0 is the south-west tile, others lie beside it by its Terrain Size",
         }),
-    };
-    let corner_m = match engine {
-        Engine::Unreal => [west, north],
-        Engine::Unity => [west, south],
-    };
+    }
+}
+
+fn about(product: &Product, layout: &Layout, samples: &Samples, off: Off) -> Value {
+    let [west, south] = product.corner_m(product.rect.south, product.rect.west);
+    let [east, north] = product.corner_m(product.rect.north, product.rect.east);
     json!({
         "area": product.manifest.area.name,
         "crs": product.crs(),
         "vertical_datum": product.vertical_datum(),
-        "engine": if engine == Engine::Unreal { "unreal" } else { "unity" },
-        "import": import,
-        "tiles": files,
-        "samples_a_side": size,
-        "spacing_m": spacing_m,
-        "first_corner_m": corner_m,
+        "engine": if layout.engine == Engine::Unreal { "unreal" } else { "unity" },
+        "import": import(layout, samples),
+        "samples_a_side": layout.size,
+        "samples": [samples.wide, samples.high()],
+        "spacing_m": layout.spacing_m,
+        "spacing_of_posts_m": product.frame.spacing.metres(),
+        "first_corner_m": [west, if layout.engine == Engine::Unreal { north } else { south }],
         "bounds_m": { "west": west, "south": south, "east": east, "north": north },
-        "continued_beyond_m": [
-            (raster.wide - 1).div_ceil(size - 1).max(1) as f64 * side_m - (east - west),
-            tiles_high * side_m - (north - south),
-        ],
-        "lowest_m": scale.low_m,
-        "step_m": scale.step_m,
+        "lowest_m": samples.scale.low_m,
+        "step_m": samples.scale.step_m,
         "height_is": "lowest_m + value * step_m",
-        "hole_samples": raster.holes,
+        "off_at_posts_m": { "max": off.max_m, "rms": off.rms_m },
+        "hole_samples": samples.holes(),
         "attribution": product.attributions(),
     })
 }
@@ -280,39 +281,82 @@ mod tests {
     #[test]
     fn tiles_share_their_border_rows_and_one_scale() {
         let files = files(&samples::product(), Engine::Unity, Some(33));
-        let names: Vec<&str> = files.keys().map(String::as_str).collect();
+        let names: Vec<&str> = files.keys().map(String::as_str).filter(|name| !name.starts_with("weights/")).collect();
         assert_eq!(names, ["heightmap.json", "sample_x0_y0.raw", "sample_x1_y0.raw"]);
         let [west, east] = ["sample_x0_y0.raw", "sample_x1_y0.raw"].map(|name| values(&files[name]));
         assert_eq!(west.len(), 33 * 33);
         let column = |tile: &[u16], col: usize| (0..33).map(|row| tile[33 * row + col]).collect::<Vec<_>>();
         assert_eq!(column(&west, 32), column(&east, 0));
         let about: Value = serde_json::from_slice(&files["heightmap.json"]).unwrap();
-        assert_eq!((&about["lowest_m"], &about["import"]["terrain_width"]), (&json!(992.1875), &json!(800.0)));
+        // 1,000 m by 500 m of ground, to its borders and not beyond.
+        let terrain = &about["import"]["Terrain Size"];
+        assert_eq!(
+            (&about["lowest_m"], &terrain["X"], &terrain["Z"]),
+            (&json!(992.1875), &json!(500.0), &json!(500.0))
+        );
         let height =
             |value: u16| about["lowest_m"].as_f64().unwrap() + f64::from(value) * about["step_m"].as_f64().unwrap();
         let highest = west.iter().chain(&east).copied().max().unwrap();
         assert_eq!((highest, height(highest).round()), (65_535, 1004.0));
     }
 
-    #[test]
-    fn a_png_has_its_northern_row_first_and_numbers_for_the_import() {
-        let files = files(&samples::product(), Engine::Unreal, None);
-        let about: Value = serde_json::from_slice(&files["heightmap.json"]).unwrap();
-        assert_eq!((&about["samples_a_side"], &about["import"]["scale_x"]), (&json!(505), &json!(2500.0)));
-        let decoder = png::Decoder::new(std::io::Cursor::new(&files["sample_x0_y0.png"][..]));
-        let mut reader = decoder.read_info().unwrap();
-        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
-        reader.next_frame(&mut bytes).unwrap();
-        let at = |row: usize, col: usize| {
-            u16::from_be_bytes([bytes[2 * (505 * row + col)], bytes[2 * (505 * row + col) + 1]])
+    /// The samples of a PNG of 8 or 16 bits, the northern row first.
+    fn png_values(bytes: &[u8]) -> (usize, Vec<u16>) {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut data = vec![0; reader.output_buffer_size().unwrap()];
+        let info = reader.next_frame(&mut data).unwrap();
+        let values = match info.bit_depth {
+            png::BitDepth::Sixteen => data.chunks(2).map(|two| u16::from_be_bytes([two[0], two[1]])).collect(),
+            _ => data.into_iter().map(u16::from).collect(),
         };
-        let unity = values(&self::files(&samples::product(), Engine::Unity, Some(65))["sample_x0_y0.raw"]);
-        for row in 0..21 {
-            for col in 0..41 {
-                assert_eq!(at(row, col), unity[65 * (20 - row) + col]);
-            }
+        (info.width as usize, values)
+    }
+
+    #[test]
+    fn samples_go_from_border_to_border_and_a_png_has_its_northern_row_first() {
+        let product = samples::product();
+        let files = files(&product, Engine::Unreal, None);
+        let about: Value = serde_json::from_slice(&files["heightmap.json"]).unwrap();
+        let import = &about["import"];
+        // Of 1,000 m by 500 m with a post each 25 m.
+        assert_eq!((&about["samples_a_side"], &about["samples"]), (&json!(127), &json!([127, 127])));
+        assert_eq!(import["Number of Components"], json!([1, 1]));
+        let scale = |axis: &str| import["Scale"][axis].as_f64().unwrap();
+        assert!((scale("X") * 126.0 - 100_000.0).abs() < 1e-6 && (scale("Y") * 126.0 - 50_000.0).abs() < 1e-6);
+        let (size, values) = png_values(&files["sample_x0_y0.png"]);
+        let height = |line: usize, col: usize| {
+            let above_m = (f64::from(values[line * size + col]) - 32_768.0) / 128.0 * scale("Z") / 100.0;
+            above_m + import["Location"]["Z"].as_f64().unwrap() / 100.0
+        };
+        let mut index = crate::triangle_index::TriangleIndex::new(&product);
+        let half_m = about["step_m"].as_f64().unwrap() / 2.0;
+        for (line, col) in (0..size).flat_map(|line| (0..size).map(move |col| (line, col))) {
+            let share = |index: usize| index as f64 / 126.0;
+            let place_m = [505_000.0 + 1000.0 * share(col), 3_875_000.0 + 500.0 * share(126 - line)];
+            let ground = index.at(place_m).unwrap();
+            assert!((height(line, col) - ground.height_m).abs() < half_m + 1e-6, "{line} {col}");
         }
-        assert_eq!(at(400, 400), at(20, 40), "the border goes on");
+        // Posts lie between samples, and no farther from them than the ground bends there.
+        let off = |of: &str| about["off_at_posts_m"][of].as_f64().unwrap();
+        assert!(0.0 < off("rms") && off("rms") < off("max") && off("max") < 0.5, "{} {}", off("rms"), off("max"));
+    }
+
+    #[test]
+    fn each_class_has_a_map_of_weights_on_the_same_samples() {
+        for engine in [Engine::Unreal, Engine::Unity] {
+            let files = files(&samples::with_hole(), engine, Some(engine.sizes()[0]));
+            let about: Value = serde_json::from_slice(&files["heightmap.json"]).unwrap();
+            let layers = about["weights"]["layers"].as_array().unwrap();
+            let classes: Vec<&str> = layers.iter().map(|layer| layer["class"].as_str().unwrap()).collect();
+            assert_eq!(classes, ["class_0", "class_1", "hole"]);
+            let mut sums = vec![0; png_values(&files[layers[0]["files"][0].as_str().unwrap()]).1.len()];
+            for layer in layers {
+                let (size, weights) = png_values(&files[layer["files"][0].as_str().unwrap()]);
+                assert_eq!(size, engine.sizes()[0]);
+                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight);
+            }
+            assert!(sums.iter().all(|sum| *sum == 255));
+        }
     }
 
     #[test]
