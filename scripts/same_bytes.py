@@ -21,7 +21,8 @@ ROOT = Path(__file__).resolve().parent.parent
 FORMATS = {
     "modules": "modules", "ply": "m.ply", "obj": "m.obj", "glb": "m.glb", "geotiff": "m.tif", "gpkg": "m.gpkg",
     "features": "f.gpkg", "openflight": "openflight", "3dtiles": "3dtiles", "quantized-mesh": "terrain",
-    "3tz": "m.3tz", "mbtiles": "m.mbtiles", "usd": "usd", "heightmap": "heightmap", "gazebo": "gazebo",
+    "3tz": "m.3tz", "mbtiles": "m.mbtiles", "terrain-rgb": "m.pmtiles", "usd": "usd",
+    "heightmap": "heightmap", "gazebo": "gazebo",
 }
 
 

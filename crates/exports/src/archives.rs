@@ -6,11 +6,11 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use md5::{Digest, Md5};
-use rusqlite::{Connection, params};
 use serde_json::Value;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
+use crate::mbtiles::write_tables;
 use crate::{Datum, ExportError, Product, Put, Work, write_3dtiles, write_quantized_mesh};
 
 /// The last file of a 3TZ: where every other begins, by the MD5 sum of its name (3D Tiles Archive Format 1.3).
@@ -85,30 +85,18 @@ pub fn write_mbtiles(
     work: &Work,
 ) -> Result<Datum, ExportError> {
     let (files, datum) = gathered(|put| write_quantized_mesh(product, assumed, put, work))?;
-    tables(path, product, &files).map_err(|error| ExportError::write("MBTiles")(std::io::Error::other(error)))?;
+    let tiles = files.iter().filter_map(|(name, bytes)| Some((tile_numbers(name)?, bytes.as_slice())));
+    write_tables(path, &about(product, &files), tiles)?;
     Ok(datum)
 }
 
-fn tables(path: &Path, product: &Product, files: &Files) -> rusqlite::Result<()> {
-    let mut connection = Connection::open(path)?;
-    // The file has a temporary name until it is whole, so nothing has to survive a crash.
-    connection.execute_batch(
-        "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA application_id = 0x4d504258;
-        CREATE TABLE metadata (name TEXT PRIMARY KEY, value TEXT);
-        CREATE TABLE tiles (zoom_level INTEGER, tile_column INTEGER, tile_row INTEGER, tile_data BLOB);",
-    )?;
-    let transaction = connection.transaction()?;
-    let mut levels = Vec::new();
-    for (name, bytes) in files {
-        if let Some([level, column, row]) = tile_numbers(name) {
-            transaction.execute("INSERT INTO tiles VALUES (?1, ?2, ?3, ?4)", params![level, column, row, bytes])?;
-            levels.push(level);
-        }
-    }
+/// What is said of all tiles.
+fn about(product: &Product, files: &Files) -> Vec<(&'static str, String)> {
+    let levels: Vec<i64> = files.keys().filter_map(|name| tile_numbers(name)).map(|[level, ..]| level).collect();
     let layer: Value = files.get("layer.json").and_then(|bytes| serde_json::from_slice(bytes).ok()).unwrap_or_default();
     let bounds = layer["bounds"].as_array().map(|bounds| bounds.iter().map(Value::to_string).collect::<Vec<_>>());
     let text = |number: Option<&i64>| number.map(i64::to_string).unwrap_or_default();
-    for (name, value) in [
+    let mut about = vec![
         ("name", product.manifest.area.name.clone()),
         ("format", "application/vnd.quantized-mesh".into()),
         ("scheme", "tms".into()),
@@ -120,15 +108,9 @@ fn tables(path: &Path, product: &Product, files: &Files) -> rusqlite::Result<()>
         ("type", "baselayer".into()),
         ("version", "1".into()),
         ("json", layer.to_string()),
-    ] {
-        transaction.execute("INSERT INTO metadata VALUES (?1, ?2)", params![name, value])?;
-    }
-    if let Some(holes) = files.get("holes.geojson") {
-        let text = String::from_utf8_lossy(holes);
-        transaction.execute("INSERT INTO metadata VALUES ('holes', ?1)", params![text])?;
-    }
-    transaction.execute_batch("CREATE UNIQUE INDEX tile_index ON tiles (zoom_level, tile_column, tile_row);")?;
-    transaction.commit()
+    ];
+    about.extend(files.get("holes.geojson").map(|holes| ("holes", String::from_utf8_lossy(holes).into_owned())));
+    about
 }
 
 /// Level, column and row of `LEVEL/COLUMN/ROW.terrain`.
@@ -143,6 +125,7 @@ mod tests {
     use std::io::Read;
     use std::sync::atomic::AtomicBool;
 
+    use rusqlite::Connection;
     use schedule::Workers;
 
     use super::*;

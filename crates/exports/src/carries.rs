@@ -42,7 +42,7 @@ const TILES: Carries = Carries {
 const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where they are";
 
 /// The table, in the order of the formats.
-pub const CARRIES: [Carries; 15] = [
+pub const CARRIES: [Carries; 16] = [
     Carries {
         format: "modules",
         classes: "a class for each triangle",
@@ -103,6 +103,7 @@ pub const CARRIES: [Carries; 15] = [
         holes: "kept, since tiles must be closed; the entry holes of metadata says where they are",
         ..RASTER
     },
+    Carries { format: "terrain-rgb", holes: "0 m high, as places outside of the area", ..RASTER },
     Carries {
         format: "usd",
         classes: "subsets with materials",
@@ -112,6 +113,8 @@ pub const CARRIES: [Carries; 15] = [
     },
     Carries {
         format: "heightmap",
+        classes: "maps of weights, one for each on the same samples",
+        objects: "placements in objects.csv",
         holes: "as high as the triangles that close them; heightmap.json counts the samples",
         ..RASTER
     },

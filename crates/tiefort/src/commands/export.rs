@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
-use clap::{Args, ValueEnum};
-use exports::{Block, CARRIES, Carries, Datum, ExportError, Facts, LEFT_OUT, Levels, Mesh, Product, Textures, Work};
+use clap::Args;
+use exports::{Block, CARRIES, Datum, ExportError, Facts, LEFT_OUT, Levels, Mesh, Product, Textures, WebMap, Work};
 use job::Job;
 use store::Folder;
 use terrain::{ModuleId, PostRect};
 use views::grouped;
 
+use super::export_formats::{Format, HeightEncoding, HeightmapEngine, Layer};
 use crate::arguments::{MeshOrigin, Workers, row_col};
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
@@ -28,6 +29,7 @@ Examples:
   tiefort export ntc.tdb --format geotiff --layer residual --out residual.tif
   tiefort export ntc.tdb --format 3dtiles --assume-datum EGM96 --out ntc_3dtiles
   tiefort export ntc.tdb --format usd --out ntc_usd
+  tiefort export ntc.tdb --format terrain-rgb --out ntc.pmtiles
   tiefort export ntc.tdb --format heightmap --engine unity --out ntc_unity
 
 --lod K exports a coarser level, where the job has [lod] levels. Without it
@@ -39,7 +41,8 @@ ROW,COL from the south-west, nodes of a glb r0003c0017. A geotiff is cloud
 optimised, with overviews; it names the system of its heights where that is
 known. 3tz is 3dtiles in one file, mbtiles quantized-mesh in one; these four
 want heights above the ellipsoid: they know EGM96 and the ellipsoid, and refuse
-any other datum unless told what to take it for.
+any other datum unless told what to take it for. terrain-rgb is a file of
+MBTiles or PMTiles by its name; its heights stay above the database's datum.
 
 Ribbons are bands over roads, rails and streams that are lines in the ground, 5
 cm above it; objects are buildings, walls and woods. Classes, ribbons and
@@ -84,9 +87,12 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = HeightmapEngine::Unreal)]
     engine: HeightmapEngine,
     /// Samples along a side of a heightmap, one of those that the engine takes [default: the least that holds the area
-    /// in one, else 2017 or 2049]; for heightmap only
+    /// in one, else 2017 or 2049]; pixels along a side of a tile of terrain-rgb, 256 or 512 [default: 512]
     #[arg(long, value_name = "N")]
     size: Option<usize>,
+    /// How heights become colours; for terrain-rgb only [default: mapbox]
+    #[arg(long, value_enum)]
+    encoding: Option<HeightEncoding>,
     /// Whether roads, rails and streams that are lines in the ground are bands over it, where the format has meshes
     #[arg(long, value_name = "BOOL", default_value_t = true, action = clap::ArgAction::Set)]
     ribbons: bool,
@@ -121,67 +127,6 @@ impl Arguments {
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// A folder with one load-module file (docs/FORMAT.md) for each load module
-    Modules,
-    /// A mesh as binary PLY
-    Ply,
-    /// A mesh as Wavefront OBJ
-    Obj,
-    /// A mesh as binary glTF 2.0
-    Glb,
-    /// A Cloud Optimized GeoTIFF of the compiled surface, or of its residual
-    Geotiff,
-    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, decks, with styles
-    Gpkg,
-    /// A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, degraded or left out
-    Features,
-    /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
-    Openflight,
-    /// A folder of 3D Tiles 1.1, for globes
-    #[value(name = "3dtiles")]
-    Tiles3d,
-    /// A folder of quantized-mesh 1.0 terrain, for globes
-    QuantizedMesh,
-    /// 3D Tiles in one archive
-    #[value(name = "3tz")]
-    Archive,
-    /// Quantized-mesh terrain in one SQLite file
-    Mbtiles,
-    /// A folder of OpenUSD text: a file for each tile, with collision meshes, for Isaac Sim, Omniverse and Blender
-    Usd,
-    /// A folder of 16-bit heightmaps for Unreal or Unity, with the numbers to type into the import dialog
-    Heightmap,
-    /// A folder with a world for Gazebo: meshes of 2 km, loaded by distance
-    Gazebo,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Layer {
-    /// Height of the compiled surface at every post
-    Surface,
-    /// Height of the ground less that of the surface
-    Residual,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum HeightmapEngine {
-    /// Sides of 505, 1009, 2017, 4033 or 8129, as PNG
-    Unreal,
-    /// Sides of 2^n + 1, as RAW
-    Unity,
-}
-
-impl From<HeightmapEngine> for exports::Engine {
-    fn from(engine: HeightmapEngine) -> Self {
-        match engine {
-            HeightmapEngine::Unreal => exports::Engine::Unreal,
-            HeightmapEngine::Unity => exports::Engine::Unity,
-        }
-    }
-}
-
 fn block(text: &str) -> Result<Block, String> {
     let module = |text: &str| row_col(text).map(|tile| ModuleId { row: tile.row, col: tile.col });
     let wrong = |_| "expected ROW,COL..ROW,COL, the south-west and the north-east load module, such as 2,3..5,7";
@@ -211,40 +156,6 @@ pub fn datum(text: &str) -> Result<Datum, String> {
 
 /// How far a datum may lie above or below the ellipsoid: twice what any geoid does.
 const DATUM_M_MAX: f64 = 250.0;
-
-impl Format {
-    /// The extension its one file must have; `None` where it is a folder.
-    fn extension(self) -> Option<&'static str> {
-        match self {
-            Format::Ply => Some("ply"),
-            Format::Obj => Some("obj"),
-            Format::Glb => Some("glb"),
-            Format::Geotiff => Some("tif"),
-            Format::Gpkg | Format::Features => Some("gpkg"),
-            Format::Archive => Some("3tz"),
-            Format::Mbtiles => Some("mbtiles"),
-            Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => None,
-            Format::Usd | Format::Heightmap | Format::Gazebo => None,
-        }
-    }
-
-    /// What it has of what a database has.
-    fn carries(self) -> &'static Carries {
-        let value = self.to_possible_value();
-        let name = value.as_ref().map_or("", |value| value.get_name());
-        CARRIES.iter().find(|row| row.format == name).expect("each format has a row")
-    }
-
-    /// Whether it has room for the ground alone, and decks are left out.
-    fn is_without_decks(self) -> bool {
-        matches!(self, Format::Geotiff | Format::QuantizedMesh | Format::Mbtiles | Format::Heightmap)
-    }
-
-    /// Whether its heights are above the ellipsoid of WGS 84.
-    fn is_for_globes(self) -> bool {
-        matches!(self, Format::Tiles3d | Format::QuantizedMesh | Format::Archive | Format::Mbtiles)
-    }
-}
 
 /// Exports.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -296,22 +207,34 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
         let message = format!("found --imagery with a format that has no textures, expected one of {expected}");
         return Err(Failure::new(message, "leave --imagery out, or choose one of these formats"));
     }
-    let is_heightmap = arguments.format == Format::Heightmap;
-    if !is_heightmap && (arguments.size.is_some() || arguments.engine != HeightmapEngine::Unreal) {
-        let message = "found --size or --engine with another format than heightmap, expected none";
-        return Err(Failure::new(message, "leave them out, or add --format heightmap"));
+    let (is_heightmap, is_map) = (arguments.format == Format::Heightmap, arguments.format == Format::TerrainRgb);
+    if !is_heightmap && arguments.engine != HeightmapEngine::Unreal {
+        let message = "found --engine with another format than heightmap, expected none";
+        return Err(Failure::new(message, "leave it out, or add --format heightmap"));
+    }
+    if !is_heightmap && !is_map && arguments.size.is_some() {
+        let message = "found --size with another format than heightmap and terrain-rgb, expected none";
+        return Err(Failure::new(message, "leave it out, or choose one of these formats"));
+    }
+    if !is_map && arguments.encoding.is_some() {
+        let message = "found --encoding with another format than terrain-rgb, expected none";
+        return Err(Failure::new(message, "leave it out, or add --format terrain-rgb"));
     }
     if arguments.against.is_some() && !residual {
         let message = "found --against without --layer residual, expected both or none";
         return Err(Failure::new(message, "only a residual is taken against a raster"));
     }
-    let Some(expected) = arguments.format.extension() else { return Ok(()) };
+    let expected = arguments.format.extensions();
+    if expected.is_empty() {
+        return Ok(());
+    }
     let found = files::extension(&arguments.out);
-    if found != expected {
-        let name = arguments.format.to_possible_value();
-        let format = name.as_ref().map_or("", |name| name.get_name());
-        let message = format!("{}: found the extension {found:?}, expected {expected:?}", arguments.out.display());
-        return Err(Failure::new(message, format!("--format {format} writes one file whose name ends in .{expected}")));
+    if !expected.contains(&found.as_str()) {
+        let format = arguments.format.name();
+        let quoted = expected.iter().map(|extension| format!("{extension:?}")).collect::<Vec<_>>().join(" or ");
+        let message = format!("{}: found the extension {found:?}, expected {quoted}", arguments.out.display());
+        let hint = format!("--format {format} writes one file whose name ends in .{}", expected.join(" or ."));
+        return Err(Failure::new(message, hint));
     }
     files::check_writable(&arguments.out)
 }
@@ -327,10 +250,8 @@ fn levels(arguments: &Arguments) -> Levels {
 
 /// Does it; what was exported, in words.
 fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
-    let folder = match arguments.format.extension() {
-        Some(_) => None,
-        None => Some(NewFolder::begin(&arguments.out)?),
-    };
+    let is_folder = arguments.format.extensions().is_empty();
+    let folder = is_folder.then(|| NewFolder::begin(&arguments.out)).transpose()?;
     let mut product = Product::read(&arguments.database, arguments.modules, levels(arguments), work)?;
     product.has_ribbons = arguments.ribbons;
     product.name_materials(arguments.materials.clone())?;
@@ -340,6 +261,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         Format::Geotiff => write_raster(arguments, &product, work)?,
         Format::Gpkg => write_package(arguments, &product, work)?,
         Format::Features => write_features(arguments)?,
+        Format::TerrainRgb => write_web_map(arguments, &product, work)?,
         _ => {}
     }
     let mut said = write_globe_file(arguments, &product, work)?;
@@ -430,6 +352,15 @@ fn write_globe_file(arguments: &Arguments, product: &Product, work: &Work) -> Re
         _ => {}
     }
     Ok(said)
+}
+
+fn write_web_map(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
+    let encoding = arguments.encoding.unwrap_or(HeightEncoding::Mapbox).into();
+    let map = WebMap { encoding, pixels: arguments.size.unwrap_or(512) };
+    if files::extension(&arguments.out) == "pmtiles" {
+        return files::write_whole_or(&arguments.out, |out| Ok(exports::write_pmtiles(out, product, map, work)?));
+    }
+    files::make_whole(&arguments.out, |path| Ok(exports::write_web_mbtiles(path, product, map, work)?))
 }
 
 fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {

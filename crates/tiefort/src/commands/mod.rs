@@ -8,6 +8,7 @@ pub mod correlate;
 mod diff;
 pub mod explain;
 pub mod export;
+mod export_formats;
 mod fidelity;
 mod inadequate;
 mod init;

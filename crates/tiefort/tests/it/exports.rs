@@ -31,6 +31,8 @@ fn every_format_is_written_and_the_same_every_time() {
         ("quantized-mesh", "terrain"),
         ("3tz", "tiles.3tz"),
         ("mbtiles", "terrain.mbtiles"),
+        ("terrain-rgb", "map.mbtiles"),
+        ("terrain-rgb", "map.pmtiles"),
         ("usd", "usd"),
         ("heightmap", "heightmap"),
         ("gazebo", "gazebo"),
@@ -126,6 +128,7 @@ fn every_format_leaves_holes_out_or_marks_them_and_says_so() {
         ("openflight", "flt", left_out),
         ("3dtiles", "tiles", left_out),
         ("quantized-mesh", "terrain", "holes.geojson says where they are"),
+        ("terrain-rgb", "map.pmtiles", "triangles over holes are 0 m high, as places outside of the area"),
         ("3tz", "tiles.3tz", left_out),
         ("mbtiles", "terrain.mbtiles", "the entry holes of metadata says where they are"),
         ("usd", "usd", left_out),
@@ -171,7 +174,11 @@ fn what_cannot_be_exported_is_refused() {
     refuses(&["modules", "--out", "a.tdb"], &["a.tdb", "expected a name that is free"]);
     refuses(&["heightmap", "--size", "1000", "--out", "new"], &["1000 samples", "505, 1009, 2017"]);
     refuses(&["heightmap", "--engine", "unity", "--size", "505", "--out", "new"], &["505 samples", "513"]);
-    refuses(&["usd", "--engine", "unity", "--out", "new"], &["--size or --engine"]);
+    refuses(&["usd", "--engine", "unity", "--out", "new"], &["--engine"]);
+    refuses(&["usd", "--size", "256", "--out", "new"], &["--size", "heightmap and terrain-rgb"]);
+    refuses(&["terrain-rgb", "--size", "505", "--out", "new.pmtiles"], &["505 pixels", "256 or 512"]);
+    refuses(&["terrain-rgb", "--out", "new.png"], &["\"png\"", "\"mbtiles\" or \"pmtiles\""]);
+    refuses(&["mbtiles", "--encoding", "terrarium", "--out", "new.mbtiles"], &["--encoding"]);
     refuses(&["3tz", "--out", "tiles.zip"], &["\"zip\"", "\"3tz\""]);
     for (format, name) in [("3dtiles", "new"), ("quantized-mesh", "new"), ("3tz", "a.3tz"), ("mbtiles", "a.mbtiles")] {
         refuses(&[format, "--out", name], &["unknown datum", "EGM96"]);

@@ -1,0 +1,125 @@
+//! The formats of `tiefort export`, and what is chosen by a word in some of them.
+
+use clap::ValueEnum;
+use exports::{CARRIES, Carries};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Format {
+    /// A folder with one load-module file (docs/FORMAT.md) for each load module
+    Modules,
+    /// A mesh as binary PLY
+    Ply,
+    /// A mesh as Wavefront OBJ
+    Obj,
+    /// A mesh as binary glTF 2.0
+    Glb,
+    /// A Cloud Optimized GeoTIFF of the compiled surface, or of its residual
+    Geotiff,
+    /// A GeoPackage for QGIS: load modules, breaches, tiles, triangles, decks, with styles
+    Gpkg,
+    /// A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, degraded or left out
+    Features,
+    /// A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index
+    Openflight,
+    /// A folder of 3D Tiles 1.1, for globes
+    #[value(name = "3dtiles")]
+    Tiles3d,
+    /// A folder of quantized-mesh 1.0 terrain, for globes
+    QuantizedMesh,
+    /// 3D Tiles in one archive
+    #[value(name = "3tz")]
+    Archive,
+    /// Quantized-mesh terrain in one SQLite file
+    Mbtiles,
+    /// Terrain for web maps, as MBTiles or PMTiles: heights as colours of PNG tiles in web mercator
+    TerrainRgb,
+    /// A folder of OpenUSD text: a file for each tile, with collision meshes, for Isaac Sim, Omniverse and Blender
+    Usd,
+    /// A folder of 16-bit heightmaps for Unreal or Unity, with the numbers to type into the import dialog
+    Heightmap,
+    /// A folder with a world for Gazebo: meshes of 2 km, loaded by distance
+    Gazebo,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Layer {
+    /// Height of the compiled surface at every post
+    Surface,
+    /// Height of the ground less that of the surface
+    Residual,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum HeightmapEngine {
+    /// Sides of 505, 1009, 2017, 4033 or 8129, as PNG
+    Unreal,
+    /// Sides of 2^n + 1, as RAW
+    Unity,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum HeightEncoding {
+    /// Tenths of a metre above -10,000 m
+    Mapbox,
+    /// 256ths of a metre above -32,768 m
+    Terrarium,
+}
+
+impl From<HeightEncoding> for exports::HeightEncoding {
+    fn from(encoding: HeightEncoding) -> Self {
+        match encoding {
+            HeightEncoding::Mapbox => exports::HeightEncoding::Mapbox,
+            HeightEncoding::Terrarium => exports::HeightEncoding::Terrarium,
+        }
+    }
+}
+
+impl From<HeightmapEngine> for exports::Engine {
+    fn from(engine: HeightmapEngine) -> Self {
+        match engine {
+            HeightmapEngine::Unreal => exports::Engine::Unreal,
+            HeightmapEngine::Unity => exports::Engine::Unity,
+        }
+    }
+}
+
+impl Format {
+    /// The extensions of which its one file must have one; none where it is a folder.
+    pub(super) fn extensions(self) -> &'static [&'static str] {
+        match self {
+            Format::Ply => &["ply"],
+            Format::Obj => &["obj"],
+            Format::Glb => &["glb"],
+            Format::Geotiff => &["tif"],
+            Format::Gpkg | Format::Features => &["gpkg"],
+            Format::Archive => &["3tz"],
+            Format::Mbtiles => &["mbtiles"],
+            Format::TerrainRgb => &["mbtiles", "pmtiles"],
+            Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => &[],
+            Format::Usd | Format::Heightmap | Format::Gazebo => &[],
+        }
+    }
+
+    /// What it is called on the command line.
+    pub(super) fn name(self) -> String {
+        self.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+    }
+
+    /// What it has of what a database has.
+    pub(super) fn carries(self) -> &'static Carries {
+        CARRIES.iter().find(|row| row.format == self.name()).expect("each format has a row")
+    }
+
+    /// Whether it has room for the ground alone, and decks are left out.
+    pub(super) fn is_without_decks(self) -> bool {
+        matches!(
+            self,
+            Format::Geotiff | Format::QuantizedMesh | Format::Mbtiles | Format::TerrainRgb | Format::Heightmap
+        )
+    }
+
+    /// Whether its heights are above the ellipsoid of WGS 84.
+    pub(super) fn is_for_globes(self) -> bool {
+        matches!(self, Format::Tiles3d | Format::QuantizedMesh | Format::Archive | Format::Mbtiles)
+    }
+}
