@@ -4,9 +4,10 @@
     python3 scripts/check_exports.py [DIR...] [--holes] [--bridge] [--tiefort PROGRAM] [--node-modules DIR]
 
 With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
-target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, trimesh, rtree, pyogrio, pyproj and
-numpy; osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; Debian's
-libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads from `tiefort serve`, with
+target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, trimesh, rtree, pyogrio, pyproj,
+quantized-mesh-tile, pmtiles, pillow and numpy; osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's
+python3-qgis); usd-core and mujoco; Debian's libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads
+from `tiefort serve`, with
 
     npm install --prefix DIR 3d-tiles-tools@0.5.4 cesium@1.140.0 gltf-validator@2.0.0-dev.3.10 puppeteer-core@24.43.1
 
@@ -18,6 +19,7 @@ import functools
 import json
 import math
 import pathlib
+import random
 import re
 import shutil
 import sqlite3
@@ -786,6 +788,8 @@ def check_quantized_mesh(database, arguments, scratch):
     spread = max(offsets) - min(offsets)
     expect(spread < 5, f"heights differ from the database's by {min(offsets):.3f} to {max(offsets):.3f} m")
     check_water(database, folder / str(level), degrees, pyproj)
+    check_cells(database, folder / str(level), degrees, pyproj)
+    check_listed(folder, level)
     holes = folder / "holes.geojson"
     rings = json.loads(holes.read_text())["features"][0]["geometry"]["coordinates"] if holes.exists() else []
     expect(len(rings) == database.holes, f"holes.geojson has {len(rings)} triangles over holes")
@@ -810,6 +814,77 @@ def check_water(database, folder, degrees, pyproj):
             found += abs(globe.polygon_area_perimeter(*ring)[0]) * mask.mean()
     off = abs(found - expected) / max(expected, 1.0)
     expect(off < 0.02 or abs(found - expected) < 2000, f"masks have {found:.0f} m2 of water, triangles {expected:.0f}")
+
+
+def check_cells(database, folder, degrees, pyproj):
+    """By quantized-mesh-tile, cells of masks have the class under them, and vertices the heights that we read."""
+    try:
+        from quantized_mesh_tile import decode
+    except ImportError as error:
+        raise Skip(error) from error
+    names = [one["name"] for one in database.report["classes"]]
+    water = {number for number, name in enumerate(names) if name in ("water", "lake", "river", "stream")}
+    to = pyproj.Transformer.from_crs(4326, database.manifest["area"]["crs"], always_xy=True)
+    paths = sorted(folder.rglob("*.terrain"))
+    draw, looked, shores, wrong, off = random.Random(5), 0, 0, 0, 0.0
+
+    def is_water(longitude, latitude):
+        """None where water and land meet, and outside."""
+        x, y = (a - b for a, b in zip(to.transform(longitude, latitude), database.origin))
+        if not (0 <= x <= database.cols * database.side and 0 <= y <= database.rows * database.side):
+            return None
+        found = {number in water for number in engines.classes_at(database, x, y)}
+        return found.pop() if len(found) == 1 else None
+
+    for path in draw.sample(paths, min(len(paths), 12)):
+        west, south = int(path.parent.name) * degrees - 180, int(path.stem) * degrees - 90
+        tile = Terrain(path.read_bytes())
+        own = decode(str(path), [west, south, west + degrees, south + degrees], hasLighting=True,
+                     hasWatermask=2 in tile.extensions)
+        heights = numpy.array([place[2] for place in own.getVerticesCoordinates()])
+        off = max(off, float(abs(heights - tile.height).max()))
+        mask = numpy.array(own.watermask, dtype=int)
+        shape = (1, 1) if mask.size == 1 else (256, 256)
+        mask = numpy.broadcast_to(mask.reshape(shape), (256, 256)) if mask.size else None
+        cell = degrees / 256
+        for _ in range(60):
+            col, row = draw.randrange(256), draw.randrange(256)
+            if mask is not None and draw.random() < 0.5 and (mask == 255).any():
+                row, col = draw.choice(numpy.argwhere(mask == 255).tolist())
+            east, north = west + (col + 0.5) * cell, south + (255.5 - row) * cell
+            near = {is_water(east + u * cell, north + v * cell) for u in (-0.5, 0, 0.5) for v in (-0.5, 0, 0.5)}
+            found = mask is not None and int(mask[row, col]) == 255
+            looked += 1
+            if len(near) != 1 or None in near:
+                shores += 1
+            else:
+                wrong += found != near.pop()
+    expect(off < 1e-3, f"quantized-mesh-tile reads the heights within {1000 * off:.3f} mm of ours")
+    expect(wrong == 0, f"of {looked} cells {wrong} differ from the classes in them; {shores} have a shore or a border")
+
+
+def check_listed(folder, last):
+    """Tiles of every tenth level list those below them, down to the next such level."""
+    wrong, count = 0, 0
+    for path in folder.rglob("*.terrain"):
+        level, x, y = int(path.parent.parent.name), int(path.parent.name), int(path.stem)
+        said = Terrain(path.read_bytes()).extensions.get(4)
+        wrong += (said is not None) != (level % 10 == 0)
+        if said is None:
+            continue
+        count += 1
+        listed = set()
+        for below, ranges in enumerate(json.loads(said[4:])["available"], level + 1):
+            listed |= {(below, col, row) for r in ranges for col in range(r["startX"], r["endX"] + 1)
+                       for row in range(r["startY"], r["endY"] + 1)}
+        there = set()
+        for below in range(level + 1, min(level + 10, last) + 1):
+            scale = 2 ** (below - level)
+            for other in (folder / str(below)).rglob("*.terrain"):
+                if int(other.parent.name) // scale == x and int(other.stem) // scale == y:
+                    there.add((below, int(other.parent.name), int(other.stem)))
+        wrong += listed != there
+    expect(wrong == 0 and count > 0, f"{count} tiles list exactly the tiles that lie below them")
 
 
 def check_headers(folder, pyproj):

@@ -1,10 +1,15 @@
-"""Checks of what game engines and robot simulators load: OpenUSD, heightmaps, Gazebo, archives for globes.
+"""Checks of what game engines and robot simulators load: OpenUSD, heightmaps, Gazebo, archives for globes, terrain for
+web maps.
 
 Each takes the database, the arguments, a scratch folder and the tools of check_exports.py: export, expect, Skip, datum.
 """
 
+import csv
 import hashlib
+import io
 import json
+import math
+import re
 import shutil
 import sqlite3
 import struct
@@ -47,6 +52,19 @@ class Ground:
             return None
         i = inside[0]
         return a[i, 2] + s[i] * (b[i, 2] - a[i, 2]) + t[i] * (c[i, 2] - a[i, 2])
+
+
+def classes_at(database, x, y):
+    """Classes of the triangles that have a place in metres from the corner of the area, on their edges too."""
+    place = (min(int(y // database.side), database.rows - 1), min(int(x // database.side), database.cols - 1))
+    module, found = database.modules[place], set()
+    px, py = 128 * (x - place[1] * database.side), 128 * (y - place[0] * database.side)
+    for triangle, number in zip(module["triangles"], module["classes"]):
+        (ax, ay, _), (bx, by, _), (cx, cy, _) = (module["vertices"][v] for v in triangle)
+        if min((bx - ax) * (py - ay) - (by - ay) * (px - ax), (cx - bx) * (py - by) - (cy - by) * (px - bx),
+               (ax - cx) * (py - cy) - (ay - cy) * (px - cx)) >= -1e-3:
+            found.add(number)
+    return found
 
 
 def check_usd(database, arguments, scratch, tools):
@@ -156,56 +174,167 @@ def check_heightmap(database, arguments, scratch, tools):
         import rasterio
     except ImportError as error:
         raise tools.Skip(error) from error
-    ground, random = Ground(database), Random(2)
+    ground = Ground(database)
     for engine, sizes in [("unreal", [505, 2017]), ("unity", [129, 1025])]:
         for size in sizes:
             folder = scratch / f"{engine}_{size}"
             tools.export(arguments, "heightmap", folder, "--engine", engine, "--size", str(size))
             about = json.loads((folder / "heightmap.json").read_text())
+
+            def pixels(name):
+                with rasterio.open(folder / name) as source:
+                    return source.read(1)
+
             tiles = {}
             for name in about["tiles"]:
-                x, y = (int(part[1:]) for part in name.rsplit(".", 1)[0].split("_")[-2:])
+                # By column from the west and row from the south, the southern row first.
+                place, values = tile_place(about, name), None
                 if engine == "unreal":
-                    with rasterio.open(folder / name) as source:
-                        tiles[x, y] = source.read(1)
-                        sound = source.dtypes == ("uint16",) and source.shape == (size, size)
+                    values = pixels(name)[::-1]
                 else:
-                    values = numpy.fromfile(folder / name, "<u2")
-                    sound = values.size == size * size
-                    tiles[x, y] = values.reshape(size, size)
-                if not sound:
+                    values = numpy.fromfile(folder / name, "<u2").reshape(size, size)
+                if values.shape != (size, size) or values.dtype != numpy.uint16:
                     tools.expect(False, f"{name} has 16 bits and {size} samples a side")
-            same = all((tile[:, -1] == tiles[x + 1, y][:, 0]).all() for (x, y), tile in tiles.items()
-                       if (x + 1, y) in tiles)
-            same &= all((tile[-1] == tiles[x, y + 1][0]).all() for (x, y), tile in tiles.items() if (x, y + 1) in tiles)
-            tools.expect(same, f"{engine} {size}: {len(tiles)} tiles share their border rows, bit by bit")
-            spacing, worst = about["spacing_m"], 0.0
-            cols, rows = (round(length / spacing) for length in (ground.wide, ground.high))
-            places = [(random.randrange(cols + 1), random.randrange(rows + 1)) for _ in range(2000)]
-            for col, row in places:
-                line = rows - row if engine == "unreal" else row
-                x, y = min(col // (size - 1), max(tiles)[0]), min(line // (size - 1), max(y for _, y in tiles))
-                value = tiles[x, y][line - y * (size - 1), col - x * (size - 1)]
-                expected = ground.height(col * spacing, row * spacing)
-                if expected is not None:
-                    worst = max(worst, abs(about["lowest_m"] + float(value) * about["step_m"] - expected))
-            half = about["step_m"] / 2
-            tools.expect(worst <= half * (1 + 1e-6), f"{engine} {size}: {1000 * worst:.2f} mm off, half a step is "
-                                                     f"{1000 * half:.2f} mm")
-            check_import(about, engine, tools)
+                tiles[place] = values
+            raster = joined(tiles, tools, f"{engine} {size}")
+            check_samples(about, raster, ground, tools, f"{engine} {size}")
+            check_import(about, raster, ground, tools)
+            if "weights" in about:
+                layers = about["weights"]["layers"]
+                weights = {layer["class"]: joined({tile_place(about, name): pixels(name)[::-1]
+                                                   for name in layer["files"]}, tools, layer["class"])
+                           for layer in layers}
+                check_weights(database, about, weights, tools, f"{engine} {size}")
+            check_placements(database, about, folder, ground, tools)
             shutil.rmtree(folder)
 
 
-def check_import(about, engine, tools):
-    """The numbers of the dialog give the heights back by the engines' own formulas."""
-    for value in [0, 12345, 65535]:
-        height, dialog = about["lowest_m"] + value * about["step_m"], about["import"]
-        if engine == "unreal":
-            found = ((value - 32768) / 128 * dialog["scale_z"] + dialog["location_z_cm"]) / 100
+def tile_place(about, name):
+    """Column from the west and row from the south of a tile, by its name."""
+    x, y = (int(part[1:]) for part in name.rsplit(".", 1)[0].split("_")[-2:])
+    tiles = round((about["samples"][1] - 1) / (about["samples_a_side"] - 1))
+    return (x, tiles - 1 - y) if about["engine"] == "unreal" else (x, y)
+
+
+def joined(tiles, tools, what):
+    """One raster of all tiles, which share the samples on their borders."""
+    same = all((tile[:, -1] == tiles[x + 1, y][:, 0]).all() for (x, y), tile in tiles.items() if (x + 1, y) in tiles)
+    same &= all((tile[-1] == tiles[x, y + 1][0]).all() for (x, y), tile in tiles.items() if (x, y + 1) in tiles)
+    if not same:
+        tools.expect(False, f"{what}: {len(tiles)} tiles share their border rows, bit by bit")
+    rows = []
+    for y in range(max(y for _, y in tiles) + 1):
+        row = [tiles[x, y] if x == 0 else tiles[x, y][:, 1:] for x in range(max(x for x, _ in tiles) + 1)]
+        rows.append(numpy.hstack(row) if y == 0 else numpy.hstack(row)[1:])
+    return numpy.vstack(rows)
+
+
+def check_samples(about, raster, ground, tools, what):
+    """Samples divide the area from border to border; each is within half a step of the ground under it."""
+    random, worst = Random(2), 0.0
+    high, wide = raster.shape
+    spacing = about["spacing_m"]
+    whole = [spacing[0] * (wide - 1), spacing[1] * (high - 1)]
+    fits = abs(whole[0] - ground.wide) < 1e-6 and abs(whole[1] - ground.high) < 1e-6
+    fits &= [wide, high] == about["samples"]
+    fits &= max(spacing) <= about["spacing_of_posts_m"] + 1e-9
+    tools.expect(fits, f"{what}: {wide} x {high} samples, {spacing[0]:.3f} x {spacing[1]:.3f} m apart, fill the area")
+    places = [(random.randrange(wide), random.randrange(high)) for _ in range(2000)]
+    places += [(0, 0), (wide - 1, 0), (0, high - 1), (wide - 1, high - 1)]
+    for col, row in places:
+        expected = ground.height(col * spacing[0], row * spacing[1])
+        if expected is not None:
+            worst = max(worst, abs(about["lowest_m"] + float(raster[row, col]) * about["step_m"] - expected))
+    half = about["step_m"] / 2
+    tools.expect(worst <= half + 1e-6, f"{what}: {1000 * worst:.2f} mm off, half a step is {1000 * half:.2f} mm")
+    # At posts, along straight lines between samples.
+    post, off = about["spacing_of_posts_m"], []
+    for _ in range(2000):
+        x, y = (random.randrange(round(length / post) + 1) * post for length in (ground.wide, ground.high))
+        expected = ground.height(x, y)
+        if expected is not None:
+            col, row = min(int(x / spacing[0]), wide - 2), min(int(y / spacing[1]), high - 2)
+            u, v = x / spacing[0] - col, y / spacing[1] - row
+            (a, b), (c, d) = raster[row:row + 2, col:col + 2].astype(float)
+            height = (a * (1 - u) + b * u) * (1 - v) + (c * (1 - u) + d * u) * v
+            off.append(abs(about["lowest_m"] + height * about["step_m"] - expected))
+    told = about["off_at_posts_m"]
+    rms = float(numpy.sqrt(numpy.mean(numpy.square(off))))
+    holds = max(off) <= told["max"] + 1e-6
+    holds &= about["hole_samples"] > 0 or abs(rms - told["rms"]) <= 0.3 * told["rms"]
+    tools.expect(holds, f"{what}: at posts {max(off):.3f} m off at most, {rms:.4f} m RMS; told {told}")
+
+
+def check_weights(database, about, weights, tools, what):
+    """A weight is 255 where the triangle under a sample is of the class, and all weights of a sample add up to that."""
+    names = [one["name"] for one in database.report["classes"] if one["name"] != "hole"]
+    total = sum(layer.astype(int) for layer in weights.values())
+    tools.expect((total == 255).all(), f"{what}: weights of {', '.join(weights)} add up to 255")
+    random, wrong = Random(3), 0
+    high, wide = total.shape
+    for _ in range(500):
+        col, row = random.randrange(wide), random.randrange(high)
+        there = classes_at(database, col * about["spacing_m"][0], row * about["spacing_m"][1])
+        words = {"hole" if number == HOLE else names[number] if len(names) > 1 else f"class_{number}"
+                 for number in there}
+        found = [name for name, layer in weights.items() if layer[row, col] == 255]
+        wrong += len(found) != 1 or found[0] not in {re.sub(r"[^A-Za-z0-9_.-]", "_", word) for word in words}
+    tools.expect(wrong == 0, f"{what}: 500 weights are those of the triangles under them ({wrong} are not)")
+
+
+def check_placements(database, about, folder, ground, tools):
+    """Each object has a placement whose rectangle is around all of its corners, in the area."""
+    expected = {}
+    for (row, col), module in database.modules.items():
+        for thing in module.get("objects", []):
+            places = [place for ring in thing.get("rings", []) for place in ring] + thing.get("places", [])
+            corners = [(col * database.side + x / 128, row * database.side + y / 128) for x, y, *_ in places]
+            expected.setdefault((thing["kind"], thing["id"]), []).extend(corners)
+    path = folder / "objects.csv"
+    if not path.exists():
+        tools.expect(not expected, "no object, no placements")
+        return
+    rows = list(csv.DictReader(path.open()))
+    outside, unit = 0, 100 if about["engine"] == "unreal" else 1
+    for line in rows:
+        number = {name: float(line[name]) / unit for name in ("x", "y", "z", "length", "width")}
+        if about["engine"] == "unreal":
+            x, y = number["x"] + ground.wide / 2, ground.high / 2 - number["y"]
+            east = -math.radians(float(line["heading"]))
         else:
-            found = dialog["position_y"] + value / 65536 * dialog["terrain_height"]
+            x, y, east = number["x"], number["z"], math.radians(90 - float(line["heading"]))
+        for corner_x, corner_y in expected.get((line["class"], int(line["id"])), []):
+            u = (corner_x - x) * math.cos(east) + (corner_y - y) * math.sin(east)
+            v = (corner_y - y) * math.cos(east) - (corner_x - x) * math.sin(east)
+            outside += abs(u) > number["length"] / 2 + 0.02 or abs(v) > number["width"] / 2 + 0.02
+    told = [(line["class"], int(line["id"])) for line in rows]
+    holds = outside == 0 and sorted(expected) == sorted(told)
+    tools.expect(holds, f"{len(rows)} placements, around all corners ({outside} not)")
+
+
+def check_import(about, raster, ground, tools):
+    """The numbers of the dialog give places and heights back by the engines' own formulas."""
+    dialog, size = about["import"], about["samples_a_side"]
+    high, wide = raster.shape
+    for value in [0, 12345, 65535]:
+        height = about["lowest_m"] + value * about["step_m"]
+        if about["engine"] == "unreal":
+            found = ((value - 32768) / 128 * dialog["Scale"]["Z"] + dialog["Location"]["Z"]) / 100
+        else:
+            found = dialog["Position"]["Y"] + value / 65536 * dialog["Terrain Size"]["Y"]
         if abs(found - height) > 1e-6:
-            tools.expect(False, f"{engine}: the dialog's numbers give {found} where the ground is {height}")
+            tools.expect(False, f"the dialog's numbers give {found} where the ground is {height}")
+    if about["engine"] == "unreal":
+        quads = int(dialog["Section Size"].split("x")[0])
+        whole = dialog["Number of Components"][0] * quads * int(dialog["Sections Per Component"][0]) + 1
+        lengths = [dialog["Scale"]["X"] / 100 * (wide - 1), dialog["Scale"]["Y"] / 100 * (high - 1)]
+        sound = whole == size and dialog["Overall Resolution"] == [size, size]
+    else:
+        tiles = [(wide - 1) // (size - 1), (high - 1) // (size - 1)]
+        lengths = [dialog["Terrain Size"]["X"] * tiles[0], dialog["Terrain Size"]["Z"] * tiles[1]]
+        sound = dialog["Resolution"] == size
+    sound &= abs(lengths[0] - ground.wide) < 1e-6 and abs(lengths[1] - ground.high) < 1e-6
+    tools.expect(sound, f"the dialog's numbers make {lengths[0]:.3f} x {lengths[1]:.3f} m of {wide} x {high} samples")
 
 
 SDF_PROGRAM = """
@@ -295,10 +424,67 @@ def check_mbtiles(database, arguments, scratch, tools):
     shutil.rmtree(folder)
 
 
+def check_terrain_rgb(database, arguments, scratch, tools):
+    """Tiles of web maps, by pmtiles, SQLite and Pillow: pixels have the height of the ground at their middles."""
+    try:
+        import pyproj
+        from PIL import Image
+        from pmtiles.reader import MmapSource, Reader, all_tiles
+    except ImportError as error:
+        raise tools.Skip(error) from error
+    ground, random = Ground(database), Random(4)
+    to = pyproj.Transformer.from_crs(4326, database.manifest["area"]["crs"], always_xy=True)
+    for encoding, size in [("mapbox", 512), ("terrarium", 256)]:
+        words = ["--encoding", encoding, "--size", str(size)]
+        packed = tools.export(arguments, "terrain-rgb", scratch / f"{encoding}.pmtiles", *words)
+        package = tools.export(arguments, "terrain-rgb", scratch / f"{encoding}.mbtiles", *words)
+        with packed.open("rb") as file:
+            source = MmapSource(file)
+            about, header = Reader(source).metadata(), Reader(source).header()
+            tiles = {place: bytes(data) for place, data in all_tiles(source)}
+        with sqlite3.connect(package) as connection:
+            rows = connection.execute("SELECT zoom_level, tile_column, tile_row, tile_data FROM tiles")
+            same = {(z, x, 2**z - 1 - y): data for z, x, y, data in rows} == tiles
+            told = dict(connection.execute("SELECT name, value FROM metadata"))
+        levels = {z for z, _, _ in tiles}
+        holds = levels == set(range(header["min_zoom"], header["max_zoom"] + 1)) and about["encoding"] == encoding
+        holds &= told["encoding"] == encoding and int(told["maxzoom"]) == header["max_zoom"]
+        tools.expect(same and holds, f"{encoding}: {len(tiles)} tiles at levels {min(levels)} to {max(levels)}, "
+                                     "the same in both files")
+        worst, seen, outside, wrong = 0.0, 0, 0, 0
+        for (z, x, y), data in tiles.items():
+            image = numpy.array(Image.open(io.BytesIO(data)))
+            if image.shape != (size, size, 3):
+                tools.expect(False, f"{z}/{x}/{y} has {size} pixels a side, and three colours")
+            for _ in range(1 + 3000 // len(tiles)):
+                col, row = random.randrange(size), random.randrange(size)
+                red, green, blue = (int(part) for part in image[row, col])
+                if encoding == "mapbox":
+                    found = -10000 + 0.1 * (65536 * red + 256 * green + blue)
+                else:
+                    found = 256 * red + green + blue / 256 - 32768
+                longitude = (x + (col + 0.5) / size) / 2**z * 360 - 180
+                latitude = math.degrees(math.atan(math.sinh(math.pi * (1 - 2 * (y + (row + 0.5) / size) / 2**z))))
+                east, north = (a - b for a, b in zip(to.transform(longitude, latitude), database.origin))
+                inside = 0 <= east <= ground.wide and 0 <= north <= ground.high
+                expected = ground.height(east, north) if inside else None
+                if expected is None:
+                    outside, wrong = outside + 1, wrong + (abs(found) > 1e-6)
+                else:
+                    seen, worst = seen + 1, max(worst, abs(found - expected))
+        half = 0.05 if encoding == "mapbox" else 0.5 / 256
+        # The places of PROJ and ours differ by less than a millimetre; on ground that steep by as much.
+        tools.expect(worst <= half + 0.003, f"{encoding}: {seen} pixels within {worst:.4f} m, half a step is {half} m")
+        tools.expect(wrong == 0, f"{encoding}: {outside} pixels outside or over holes are 0 m high ({wrong} are not)")
+        packed.unlink()
+        package.unlink()
+
+
 CHECKS = [
     ("usd", check_usd),
     ("heightmap", check_heightmap),
     ("gazebo", check_gazebo),
     ("3tz", check_3tz),
     ("mbtiles", check_mbtiles),
+    ("terrain-rgb", check_terrain_rgb),
 ]
