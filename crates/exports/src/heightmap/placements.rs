@@ -3,13 +3,13 @@
 use std::fmt::Write;
 
 use serde_json::{Value, json};
+use terrain::plans::union;
 use terrain::{QUANTA_PER_METRE, metres_of_quanta};
 
 use super::engine::Engine;
 use crate::Product;
 use crate::boxes::least_rectangle;
 use crate::gpkg_objects::wholes;
-use crate::objects::united;
 use crate::triangle_index::TriangleIndex;
 
 /// The name of the file.
@@ -47,7 +47,8 @@ pub(crate) fn placements(product: &Product, engine: Engine) -> Option<String> {
     let mut text = "class,id,x,y,z,heading,length,width,height\n".to_owned();
     for ((kind, id), whole) in &wholes {
         let metres = |[x, y]: [i32; 2]| [x, y].map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE));
-        let outlines = united(&whole.rings).into_iter().filter_map(|shape| shape.into_iter().next());
+        let outlines =
+            union(std::slice::from_ref(&whole.rings)).into_iter().filter_map(|shape| shape.into_iter().next());
         let ring: Vec<[f64; 2]> = outlines.flatten().map(metres).collect();
         let Some((middle, size, turned)) = least_rectangle(&ring) else { continue };
         let ground_m = || {
