@@ -94,19 +94,74 @@ pub(crate) fn read_layout(store: &Store, file: &mut Handle) -> Result<Layout, So
 
 /// The tags of the first directory, each with the first of its values; all of them lie inside the file.
 pub(crate) fn first_directory(store: &Store, file: &mut Handle) -> Result<Vec<(u16, u64)>, SourceError> {
-    Bytes { path: store.path(), file, len: store.len(), little: true, big_tiff: false }.directory()
+    Bytes::new(store.path(), file, store.len()).directory()
+}
+
+/// A tag as it is stored: its number, TIFF's code of the kind of its values, how many there are, and their bytes.
+#[derive(Clone, Debug)]
+pub(crate) struct RawTag {
+    pub tag: u16,
+    pub kind: u16,
+    pub count: u64,
+    pub bytes: Vec<u8>,
 }
 
 /// The open file, read at given places and never past its end.
-struct Bytes<'a> {
+pub(crate) struct Bytes<'a, R> {
     path: &'a Path,
-    file: &'a mut Handle,
+    file: &'a mut R,
     len: u64,
     little: bool,
     big_tiff: bool,
 }
 
-impl Bytes<'_> {
+impl<'a, R: Read + Seek> Bytes<'a, R> {
+    pub(crate) fn new(path: &'a Path, file: &'a mut R, len: u64) -> Self {
+        Self { path, file, len, little: true, big_tiff: false }
+    }
+
+    pub(crate) fn is_little(&self) -> bool {
+        self.little
+    }
+
+    pub(crate) fn is_big_tiff(&self) -> bool {
+        self.big_tiff
+    }
+
+    /// The first value of a tag of whole numbers.
+    pub(crate) fn first(&self, tag: &RawTag) -> Option<u64> {
+        self.numbers(&RawTag { bytes: tag.bytes.get(..size_of_kind(tag.kind.into()) as usize)?.into(), ..*tag }).pop()
+    }
+
+    /// The values of a tag of whole numbers.
+    pub(crate) fn numbers(&self, tag: &RawTag) -> Vec<u64> {
+        let size = size_of_kind(tag.kind.into()).max(1) as usize;
+        tag.bytes.chunks_exact(size).map(|bytes| number(self.little, bytes)).collect()
+    }
+
+    /// The tags of the directory at a place, of at most `count_max` values each, and where the next one begins; 0
+    /// where it is the last.
+    pub(crate) fn raw_directory(&mut self, at: u64, count_max: u64) -> Result<(Vec<RawTag>, u64), SourceError> {
+        const WHAT: &str = "a directory";
+        let (count, start, size) = self.head(at, WHAT)?;
+        let tags = (0..count).map(|index| self.raw_tag(start + index * size, count_max)).collect::<Result<_, _>>()?;
+        let after = start + count * size;
+        let next = if self.big_tiff { self.number::<8>(after, WHAT) } else { self.number::<4>(after, WHAT) };
+        Ok((tags, next?))
+    }
+
+    fn raw_tag(&mut self, at: u64, count_max: u64) -> Result<RawTag, SourceError> {
+        let (tag, kind, count, place) = self.placed(at)?;
+        if count_max < count {
+            let path = self.path.into();
+            return Err(SourceError::TooLarge { path, what: "values of a tag", found: count, limit: count_max });
+        }
+        let mut bytes = vec![0; (count * size_of_kind(kind)) as usize];
+        let read = self.file.seek(SeekFrom::Start(place)).and_then(|_| self.file.read_exact(&mut bytes));
+        read.map_err(|source| SourceError::Read { path: self.path.into(), source })?;
+        Ok(RawTag { tag, kind: kind as u16, count, bytes })
+    }
+
     fn take<const N: usize>(&mut self, at: u64, what: &str) -> Result<[u8; N], SourceError> {
         self.holds(at, N as u64, what)?;
         let mut taken = [0; N];
@@ -125,14 +180,12 @@ impl Bytes<'_> {
 
     /// An unsigned number of `N` bytes in the file's byte order.
     fn number<const N: usize>(&mut self, at: u64, what: &str) -> Result<u64, SourceError> {
-        let mut bytes: [u8; N] = self.take(at, what)?;
-        if !self.little {
-            bytes.reverse();
-        }
-        Ok(bytes.iter().rev().fold(0, |number, &byte| number << 8 | u64::from(byte)))
+        let bytes: [u8; N] = self.take(at, what)?;
+        Ok(number(self.little, &bytes))
     }
 
-    fn header(&mut self) -> Result<u64, SourceError> {
+    /// Where the first directory is.
+    pub(crate) fn header(&mut self) -> Result<u64, SourceError> {
         let start: [u8; 4] = match self.len {
             0..4 => Err(self.not_tiff(&[]))?,
             _ => self.take(0, "the header")?,
@@ -157,17 +210,23 @@ impl Bytes<'_> {
     fn directory(&mut self) -> Result<Vec<(u16, u64)>, SourceError> {
         const WHAT: &str = "the first directory";
         let at = self.header()?;
+        let (count, start, size) = self.head(at, WHAT)?;
+        let directory: Vec<_> = (0..count).map(|index| self.entry(start + index * size)).collect::<Result<_, _>>()?;
+        self.refuse_repeated(&directory)?;
+        Ok(directory)
+    }
+
+    /// How many tags the directory at a place has, where they begin, and the bytes of each.
+    fn head(&mut self, at: u64, what: &str) -> Result<(u64, u64, u64), SourceError> {
         let (count, start, size) = match self.big_tiff {
-            false => (self.number::<2>(at, WHAT)?, at.saturating_add(2), 12),
-            true => (self.number::<8>(at, WHAT)?, at.saturating_add(8), 20),
+            false => (self.number::<2>(at, what)?, at.saturating_add(2), 12),
+            true => (self.number::<8>(at, what)?, at.saturating_add(8), 20),
         };
         if TAGS_MAX < count {
             return Err(SourceError::TooLarge { path: self.path.into(), what: "tags", found: count, limit: TAGS_MAX });
         }
-        self.holds(start, count * size, WHAT)?;
-        let directory: Vec<_> = (0..count).map(|index| self.entry(start + index * size)).collect::<Result<_, _>>()?;
-        self.refuse_repeated(&directory)?;
-        Ok(directory)
+        self.holds(start, count * size, what)?;
+        Ok((count, start, size))
     }
 
     /// Readers differ on which of two equal tags they believe.
@@ -185,28 +244,27 @@ impl Bytes<'_> {
         }
     }
 
-    fn entry(&mut self, at: u64) -> Result<(u16, u64), SourceError> {
+    /// A tag, the kind of its values, how many there are, and where they lie, once that is inside the file.
+    fn placed(&mut self, at: u64) -> Result<(u16, u64, u64, u64), SourceError> {
         let tag = self.number::<2>(at, "a tag")? as u16;
         let kind = self.number::<2>(at + 2, "a tag")?;
         let (count, room, at) = match self.big_tiff {
             false => (self.number::<4>(at + 4, "a tag")?, 4, at + 8),
             true => (self.number::<8>(at + 4, "a tag")?, 8, at + 12),
         };
-        let size = match kind {
-            1 | 2 | 6 | 7 => 1,
-            3 | 8 => 2,
-            4 | 9 | 11 | 13 => 4,
-            5 | 10 | 12 | 16..=18 => 8,
-            _ => 0,
-        };
-        let bytes = count.saturating_mul(size);
+        let bytes = count.saturating_mul(size_of_kind(kind));
         let place = match (room < bytes, self.big_tiff) {
             (false, _) => at,
             (true, false) => self.number::<4>(at, "a tag")?,
             (true, true) => self.number::<8>(at, "a tag")?,
         };
-        let what = format!("the value of tag {tag}");
-        self.holds(place, bytes, &what)?;
+        self.holds(place, bytes, &format!("the value of tag {tag}"))?;
+        Ok((tag, kind, count, place))
+    }
+
+    fn entry(&mut self, at: u64) -> Result<(u16, u64), SourceError> {
+        let (tag, kind, count, place) = self.placed(at)?;
+        let (size, what) = (size_of_kind(kind), format!("the value of tag {tag}"));
         let first = match (count, size) {
             (0, _) | (_, 0) => 0,
             (_, 1) => self.number::<1>(place, &what)?,
@@ -216,6 +274,23 @@ impl Bytes<'_> {
         };
         Ok((tag, first))
     }
+}
+
+/// Bytes of a value by TIFF's code of its kind; 0 for kinds that are not known.
+fn size_of_kind(kind: u64) -> u64 {
+    match kind {
+        1 | 2 | 6 | 7 => 1,
+        3 | 8 => 2,
+        4 | 9 | 11 | 13 => 4,
+        5 | 10 | 12 | 16..=18 => 8,
+        _ => 0,
+    }
+}
+
+/// An unsigned number in either order of bytes.
+pub(crate) fn number(is_little: bool, bytes: &[u8]) -> u64 {
+    let add = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
+    if is_little { bytes.iter().rev().fold(0, add) } else { bytes.iter().fold(0, add) }
 }
 
 /// What the first directory says.

@@ -26,6 +26,8 @@ mod directory;
 mod geotiff;
 mod unpacked;
 pub use geotiff::GeoTiff;
+mod tiff_part;
+pub use tiff_part::TiffLevels;
 mod dem_file;
 mod dted;
 mod hgt;

@@ -36,6 +36,11 @@ pub fn judge_datums(
     let mut grids = Grids { job, area, read: Vec::new() };
     for (shift, (file, datum)) in found.shifts.iter_mut().zip(datums) {
         match datum {
+            Some(datum) if is_taken_as_equal(job, datum, &wanted) => found.warnings.push(format!(
+                "{}: heights above {datum} are taken as above {wanted}: the two geoids differ by 0.5 m RMS and 10 m at \
+                 most; grids of both in dem.geoids bring one to the other",
+                file.written
+            )),
             Some(datum) if plain_datum(datum) != plain_datum(&wanted) => {
                 *shift = Some(grids.shift(file, datum, &wanted)?);
             }
@@ -47,6 +52,13 @@ pub fn judge_datums(
         }
     }
     Ok(found)
+}
+
+/// Whether two datums are the geoids EGM96 and EGM2008, for neither of which the job names a grid.
+fn is_taken_as_equal(job: &Job, datum: &str, wanted: &str) -> bool {
+    let pair = [plain_datum(datum), plain_datum(wanted)];
+    let has_grid = |name: &String| job.dem.geoids.iter().any(|geoid| plain_datum(&geoid.datum) == *name);
+    (pair == ["egm96", "egm2008"] || pair == ["egm2008", "egm96"]) && !pair.iter().any(has_grid)
 }
 
 /// The grids of a job, each read once.

@@ -41,6 +41,8 @@ mod records;
 pub use records::{records, states};
 mod locate;
 pub use locate::{Corner, corners, covered, find_area, rectangle_around, utm_of};
+mod needed;
+pub use needed::{Needed, needed};
 mod features_seen;
 pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, features_in};
 mod foresee;

@@ -15,6 +15,7 @@ mod real_vectors;
 mod refusals;
 mod resampling;
 mod support;
+mod tiff_parts;
 mod vectors;
 mod void_rules;
 mod windows;
