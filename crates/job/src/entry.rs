@@ -10,7 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use crate::key::whole_text;
-use crate::{Choice, Fault, JobError, NamedFile, NoArea, Values, keys};
+use crate::{Choice, Fault, JobError, NamedFile, NoArea, Values, keys, remote};
 
 /// A job file as text, with its path.
 #[derive(Clone, Copy)]
@@ -29,6 +29,7 @@ impl Document<'_> {
     fn quote(&self, span: Range<usize>) -> String {
         const CHARS_MAX: usize = 60;
         let words = self.text[span].split_whitespace().collect::<Vec<_>>().join(" ");
+        let words = remote::without_secrets(&words);
         if words.chars().count() <= CHARS_MAX {
             return words;
         }
@@ -237,11 +238,15 @@ impl<'a> Entry<'a> {
         if is_good { Ok(text.to_owned()) } else { Err(self.out_of_range(self.expected())) }
     }
 
-    /// The file that the value names, relative to the folder of the job.
+    /// The file that the value names, relative to the folder of the job, or its address on another machine.
     pub fn file(&self, job: &Path) -> Result<NamedFile, JobError> {
         let written = self.text()?;
         if written.is_empty() || written.contains('\0') {
             return Err(self.out_of_range("the path of a file, relative to the job file"));
+        }
+        if remote::is_remote(written) {
+            remote::check_address(written).map_err(|expected| self.out_of_range(expected))?;
+            return Ok(NamedFile { written: remote::without_query(written).to_owned(), path: written.into() });
         }
         let folder = job.parent().unwrap_or(Path::new(""));
         Ok(NamedFile { written: written.to_owned(), path: folder.join(written) })

@@ -56,6 +56,14 @@ pub enum JobError {
         /// What the parser said.
         message: String,
     },
+    /// A lock that is not as it was written.
+    #[error("{path}: found {found}, expected a lock as `tiefort fetch` writes it")]
+    BrokenLock {
+        /// The lock.
+        path: PathBuf,
+        /// What is the matter.
+        found: String,
+    },
     /// A key that no job has.
     #[error("{0}")]
     UnknownKey(Box<Fault>),
@@ -123,6 +131,7 @@ impl JobError {
             JobError::NotText { path, .. } => {
                 format!("a job is text; for a raster this writes one: tiefort init {} --out mine.toml", path.display())
             }
+            JobError::BrokenLock { .. } => "remove it, and run `tiefort fetch` again: fetched files are kept".into(),
             JobError::Syntax { .. } => "texts are quoted: name = \"ntc\"; sections are in brackets: [area]".into(),
             JobError::UnknownKey(fault)
             | JobError::Missing(fault)

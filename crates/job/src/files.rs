@@ -22,7 +22,7 @@ pub(crate) struct Mention {
 }
 
 /// Which list of the job names the file, and where in it.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Place {
     Source(usize),
     ImportanceArea(usize),

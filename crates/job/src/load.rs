@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 use crate::bounds::JOB_BYTES_MAX;
-use crate::{FindArea, Job, JobError, files, read};
+use crate::{FindArea, Job, JobError, fetched, files, read};
 
 impl Job {
     /// Reads the job file at `path` and finds the files it names.
@@ -33,12 +33,22 @@ impl Job {
         Self::of_text_asking(text, path, Some(find))
     }
 
+    /// Reads the job file at `path`, whose area `find` may have to find, and looks for none of its files: paths of
+    /// files of other machines are their addresses.
+    ///
+    /// # Errors
+    /// As [`Job::load_with`], but for those of files.
+    pub fn load_remote(path: &Path, find: &FindArea) -> Result<Job, JobError> {
+        read::read(&text_of(path)?, path, Some(find)).map(|(job, _)| job)
+    }
+
     fn load_asking(path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
         Self::of_text_asking(&text_of(path)?, path, find)
     }
 
     fn of_text_asking(text: &str, path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
         let (mut job, mentions) = read::read(text, path, find)?;
+        fetched::settle(&mut job, &mentions)?;
         files::locate(&mut job, mentions)?;
         Ok(job)
     }

@@ -17,7 +17,7 @@ use toml::de::DeTable;
 
 use crate::entry::{Document, Section, check_sections};
 use crate::files::Mention;
-use crate::{AreaPlace, DemSource, FindArea, Job, JobError, NoArea, SourceFile, files};
+use crate::{AreaPlace, DemSource, FindArea, Job, JobError, NoArea, SourceFile, files, is_remote};
 
 /// The sections of a job file, their keys known.
 struct Sections<'a> {
@@ -98,6 +98,12 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
 fn files_of(dem: &Section, path: &Path) -> Result<Vec<SourceFile>, JobError> {
     let mut mentions = Vec::new();
     let mut spec = dem::read(dem, path, &mut mentions)?;
+    if let DemSource::Files { files, .. } = &spec.source
+        && files.iter().any(|file| is_remote(&file.written))
+    {
+        let hint = "rasters of other machines are fetched for an area: give around, or origin_m and size_m";
+        return Err(dem.required("sources")?.conflict("area.cover", "files of this machine", hint));
+    }
     files::locate_sources(&mut spec.source, path.parent().unwrap_or(Path::new("")), &mentions)?;
     match spec.source {
         DemSource::Files { files, .. } => Ok(files),
