@@ -12,6 +12,8 @@ pub enum Datum {
     Ellipsoid,
     /// The geoid EGM96, computed from its coefficients.
     Egm96,
+    /// The geoid EGM2008, taken for EGM96: they differ by 0.5 m RMS and 10 m at most.
+    Egm2008,
     /// A surface that lies so many metres above the ellipsoid everywhere in the area.
     Above(f64),
 }
@@ -21,6 +23,7 @@ impl Datum {
     pub fn named(name: &str) -> Option<Self> {
         match plain_datum(name).as_str() {
             "egm96" | "egm96geoid" | "epsg5773" => Some(Self::Egm96),
+            "egm2008" | "egm2008geoid" | "epsg3855" => Some(Self::Egm2008),
             "ellipsoid" | "ellipsoidal" | "wgs84" | "wgs84ellipsoid" | "grs80" | "epsg4979" => Some(Self::Ellipsoid),
             _ => None,
         }
@@ -31,6 +34,9 @@ impl Datum {
         match self {
             Self::Ellipsoid => "heights are above the ellipsoid already".into(),
             Self::Egm96 => "the geoid EGM96 was added to heights".into(),
+            Self::Egm2008 => {
+                "the geoid EGM96 was added to heights above EGM2008: they differ by 0.5 m RMS, 10 m at most".into()
+            }
             Self::Above(metres) => format!("{metres} m were added to heights, as told"),
         }
     }
@@ -82,7 +88,7 @@ impl Earth {
                 hint: "export the two sides one after the other, with --modules".into(),
             });
         }
-        if datum == Datum::Egm96 {
+        if matches!(datum, Datum::Egm96 | Datum::Egm2008) {
             earth.geoid = Some(GeoidGrid::over(&outline));
         }
         Ok(earth)

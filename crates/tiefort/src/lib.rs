@@ -16,6 +16,7 @@
 
 mod arguments;
 mod board;
+mod catalogue;
 mod certificate;
 mod clock;
 mod commands;
@@ -26,6 +27,8 @@ mod engines;
 mod estimate;
 mod events;
 mod failure;
+#[cfg(feature = "fetch")]
+mod fetch;
 mod figures;
 mod files;
 mod fit;
@@ -75,10 +78,13 @@ Exit codes:
   130  stopped by SIGINT; 143 by SIGTERM";
 
 /// What is built in beyond what every program has.
-const FEATURES: &str = match (cfg!(feature = "serve"), cfg!(feature = "viewer")) {
-    (_, true) => "serve, viewer",
-    (true, false) => "serve (viewer is left out)",
-    (false, false) => "none (serve and viewer are left out)",
+const FEATURES: &str = match (cfg!(feature = "serve"), cfg!(feature = "viewer"), cfg!(feature = "fetch")) {
+    (_, true, true) => "serve, viewer, fetch",
+    (_, true, false) => "serve, viewer (fetch is left out)",
+    (true, false, true) => "serve, fetch (viewer is left out)",
+    (true, false, false) => "serve (viewer and fetch are left out)",
+    (false, false, true) => "fetch (serve and viewer are left out)",
+    (false, false, false) => "none (serve, viewer and fetch are left out)",
 };
 
 /// Version of the program, what it was built from, versions of what it writes, and of how it decides.

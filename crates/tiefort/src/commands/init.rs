@@ -7,6 +7,7 @@ use build::workbench::{Seen, SeenFeatures, Suggestion};
 use clap::{Args, ValueEnum};
 use job::Job;
 
+use crate::commands::init_around;
 use crate::commands::init_features::{features_section, objects_section, told_of};
 use crate::commands::init_limits::{Asked, Limits, choose};
 use crate::commands::job_words::{comment, quoted, relative};
@@ -19,6 +20,7 @@ Examples:
   tiefort init dem/*.hgt > area.toml && tiefort build area.toml
   tiefort init grid.asc --crs EPSG:32611
   tiefort init dem.tif roads.osm.pbf lakes.gpkg --out mine.toml
+  tiefort init --around 35.3,-116.6 --km 50 --dem glo30 --out irwin.toml
 
 The job covers the largest rectangle of whole load modules inside the rasters.
 Roads, rivers and lakes become parts of the ground there, buildings, walls and
@@ -30,8 +32,21 @@ woods stand on it.";
 pub struct Arguments {
     /// Rasters, or folders of them: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of
     /// priority. Roads, water, buildings and woods: .osm.pbf, GeoPackage, Shapefile, GeoJSON
-    #[arg(value_name = "FILES", required = true)]
+    #[arg(value_name = "FILES", required_unless_present = "around", conflicts_with = "around")]
     files: Vec<PathBuf>,
+    /// Latitude and longitude in degrees: an area around that place, with heights that `tiefort fetch` brings
+    #[arg(long, value_name = "LAT,LON", value_parser = init_around::place, requires = "dem",
+          conflicts_with_all = ["crs", "rms"], allow_hyphen_values = true)]
+    around: Option<[f64; 2]>,
+    /// Kilometres of that area from west to east and from south to north
+    #[arg(long, value_name = "N", default_value = "50", value_parser = kilometres, requires = "around")]
+    km: f64,
+    /// Which heights, by a name that `tiefort sources` lists
+    #[arg(long, value_name = "NAME", requires = "around")]
+    dem: Option<String>,
+    /// A file with sources of your own
+    #[arg(long, value_name = "FILE.toml", requires = "around")]
+    catalogue: Option<PathBuf>,
     /// Where to write the job; it must not exist yet [default: standard output]
     #[arg(long, value_name = "JOB.toml")]
     out: Option<PathBuf>,
@@ -57,6 +72,12 @@ enum Hardware {
     Simnet,
 }
 
+/// Kilometres of a side.
+fn kilometres(text: &str) -> Result<f64, String> {
+    let km = text.parse().ok().filter(|km| (1.0..=400.0).contains(km));
+    km.ok_or_else(|| "expected 1 to 400 km".to_owned())
+}
+
 /// A residual in metres.
 fn residual(text: &str) -> Result<f64, String> {
     let metres = text.parse().ok().filter(|metres| (0.01..=1000.0).contains(metres));
@@ -78,6 +99,9 @@ impl Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     // Rasters may take long to look at.
     arguments.out.as_deref().map_or(Ok(()), crate::files::check_free)?;
+    if let (Some(place), Some(dem)) = (arguments.around, &arguments.dem) {
+        return around(arguments, place, dem);
+    }
     let (vectors, files): (Vec<PathBuf>, Vec<PathBuf>) =
         named_files(&arguments.files)?.into_iter().partition(|path| build::workbench::is_feature_file(path));
     if let ([first, ..], []) = (vectors.as_slice(), files.as_slice()) {
@@ -119,6 +143,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let name = out.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     crate::files::write_new(out, &text(out.parent().unwrap_or(Path::new("")), &name))?;
     terminal::print(&format!("{} is written; build it: tiefort build {}\n", out.display(), out.display()))?;
+    Ok(Outcome::Sound)
+}
+
+/// Writes a job for a place on the Earth.
+fn around(arguments: &Arguments, place: [f64; 2], dem: &str) -> Result<Outcome, Failure> {
+    let limits = Limits::of(arguments.mean.unwrap_or(BUDGETS[0]));
+    let name = arguments.out.as_deref().and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
+    let name = plain_name(&name.unwrap_or_default());
+    let source = (dem, arguments.catalogue.as_deref());
+    let text = init_around::job_text(place, arguments.km, source, &limits, &name)?;
+    let Some(out) = &arguments.out else {
+        terminal::print(&text)?;
+        return Ok(Outcome::Sound);
+    };
+    crate::files::write_new(out, &text)?;
+    let path = out.display();
+    terminal::print(&format!("{path} is written; fetch what it names: tiefort fetch {path}\n"))?;
     Ok(Outcome::Sound)
 }
 

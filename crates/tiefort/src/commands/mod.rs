@@ -9,9 +9,11 @@ mod diff;
 pub mod explain;
 pub mod export;
 mod export_formats;
+mod fetch;
 mod fidelity;
 mod inadequate;
 mod init;
+mod init_around;
 mod init_features;
 mod init_limits;
 mod job_words;
@@ -24,6 +26,7 @@ mod report;
 mod sample;
 mod serve;
 mod sight;
+mod sources;
 mod status;
 mod task;
 pub mod tile;
@@ -41,6 +44,10 @@ use crate::failure::{Failure, Outcome};
 pub enum Command {
     /// Write a job for the rasters you have
     Init(init::Arguments),
+    /// List the heights of the Earth that are known by name
+    Sources(sources::Arguments),
+    /// Bring what a job names on other machines: only the tiles that it needs
+    Fetch(fetch::Arguments),
     /// Compile a whole gaming area; what is published and fresh is kept
     Build(build::Arguments),
     /// Re-run one tile
@@ -99,6 +106,8 @@ impl Command {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Command::Init(arguments) => init::run(&arguments),
+            Command::Sources(arguments) => sources::run(&arguments),
+            Command::Fetch(arguments) => fetch::run(&arguments),
             Command::Build(arguments) => build::run(&arguments),
             Command::Tile(arguments) => tile::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),

@@ -12,6 +12,8 @@ mod correlating;
 mod documents;
 mod exports;
 mod features;
+#[cfg(feature = "fetch")]
+mod fetch;
 mod foreseen;
 mod full_disk;
 mod help;
@@ -25,6 +27,8 @@ mod outlook;
 #[cfg(unix)]
 mod paths;
 mod raster;
+#[cfg(feature = "fetch")]
+mod remote;
 mod roads_and_water;
 mod scene;
 #[cfg(feature = "serve")]

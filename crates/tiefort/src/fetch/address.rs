@@ -1,0 +1,111 @@
+//! Addresses: what a job names, and what is asked for over HTTP.
+
+use job::without_query;
+
+use super::fault::Fault;
+
+/// An address that is asked for, which messages show without what follows its `?`.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Address {
+    url: String,
+}
+
+impl Address {
+    /// What is asked for a file that a job names; `variable` gives a variable of the environment.
+    ///
+    /// # Errors
+    /// When the region or the endpoint of an `s3://` address makes no address that is followed.
+    pub fn of(named: &str, variable: &dyn Fn(&str) -> Option<String>) -> Result<Self, Fault> {
+        let url = match named.strip_prefix("s3://").and_then(|rest| rest.split_once('/')) {
+            None => named.to_owned(),
+            Some((bucket, key)) => match (variable("AWS_ENDPOINT_URL"), variable("AWS_REGION")) {
+                (Some(endpoint), _) => format!("{}/{bucket}/{key}", endpoint.trim_end_matches('/')),
+                (None, Some(region)) => format!("https://{bucket}.s3.{region}.amazonaws.com/{key}"),
+                // Buckets of other regions are told by a redirect.
+                (None, None) => format!("https://{bucket}.s3.amazonaws.com/{key}"),
+            },
+        };
+        Self::checked(url)
+    }
+
+    /// Where a server sends a client on to.
+    ///
+    /// # Errors
+    /// When that is another scheme, a path of this machine, or less safe than where it was asked.
+    pub fn redirected(&self, location: &str) -> Result<Self, Fault> {
+        let shown = without_query(location);
+        let scheme_end = self.url.find("://").map_or(0, |at| at + 3);
+        let host_end = self.url[scheme_end..].find('/').map_or(self.url.len(), |at| scheme_end + at);
+        let url = match location.strip_prefix('/') {
+            Some(rest) if !rest.starts_with('/') => format!("{}{location}", &self.url[..host_end]),
+            _ => location.to_owned(),
+        };
+        let is_less_safe = self.url.starts_with("https://") && !url.starts_with("https://");
+        if is_less_safe || !url.starts_with("http") {
+            return Err(Fault::last(format!("{self}: it leads on to {shown}, which is not followed")));
+        }
+        Self::checked(url).map_err(|_| Fault::last(format!("{self}: it leads on to {shown}, which is not followed")))
+    }
+
+    fn checked(url: String) -> Result<Self, Fault> {
+        match job::check_address(&url) {
+            Ok(()) => Ok(Self { url }),
+            Err(expected) => {
+                Err(Fault::last(format!("{}: found this address, expected {expected}", without_query(&url))))
+            }
+        }
+    }
+
+    /// The whole address, for the request alone.
+    pub fn url(&self) -> &str {
+        &self.url
+    }
+
+    /// Whether it is of this machine itself, where no proxy lies between.
+    pub fn is_of_this_machine(&self) -> bool {
+        self.url.starts_with("http://")
+    }
+}
+
+impl std::fmt::Debug for Address {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{self}")
+    }
+}
+
+impl std::fmt::Display for Address {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(without_query(&self.url))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bucket_is_asked_for_where_the_environment_says() {
+        let url = |set: &[(&str, &str)]| {
+            let variable = |name: &str| set.iter().find(|(key, _)| *key == name).map(|(_, value)| (*value).to_owned());
+            Address::of("s3://b/k/x.tif", &variable).map(|address| address.url().to_owned()).map_err(|fault| fault.text)
+        };
+        assert_eq!(url(&[]).unwrap(), "https://b.s3.amazonaws.com/k/x.tif");
+        assert_eq!(url(&[("AWS_REGION", "eu-west-1")]).unwrap(), "https://b.s3.eu-west-1.amazonaws.com/k/x.tif");
+        assert_eq!(url(&[("AWS_ENDPOINT_URL", "http://127.0.0.1:9000/")]).unwrap(), "http://127.0.0.1:9000/b/k/x.tif");
+        assert!(url(&[("AWS_ENDPOINT_URL", "http://a.org")]).is_err());
+    }
+
+    #[test]
+    fn redirects_lead_to_no_file_no_other_scheme_and_nothing_less_safe() {
+        let none = |_: &str| None;
+        let from = |url: &str| Address::of(url, &none).unwrap();
+        let good = from("https://a.org/x.tif?s=1");
+        assert_eq!(good.redirected("/y.tif").unwrap().url(), "https://a.org/y.tif");
+        assert_eq!(good.redirected("https://b.org/y.tif?t=2").unwrap().url(), "https://b.org/y.tif?t=2");
+        for bad in ["file:///etc/passwd", "s3://b/x.tif", "http://127.0.0.1/x.tif", "//b.org/x", "y.tif", "ftp://a/x"] {
+            let fault = good.redirected(bad).unwrap_err().text;
+            assert!(fault.contains("is not followed") && !fault.contains("s=1"), "{fault}");
+        }
+        assert!(from("http://127.0.0.1/x").redirected("http://a.org/x").is_err());
+    }
+}

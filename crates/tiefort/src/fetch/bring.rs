@@ -1,0 +1,101 @@
+//! A planned file, brought: its ranges by several requests at a time, then the file under its final name, whole.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use job::Locked;
+use schedule::{ScheduleError, Workers};
+use store::engine::Fingerprint;
+
+use super::client::Client;
+use super::fault::Fault;
+use super::pieces::Piece;
+use super::plan::{Planned, What, disk};
+
+/// Requests at a time.
+const REQUESTS: usize = 8;
+/// Times that a file which comes in one answer is asked for.
+const TRIES: u32 = 3;
+
+/// Brings a file; `told` hears of every range, with the bytes that have come of the file.
+///
+/// # Errors
+/// When a range does not come, or cannot be written; those that came are kept.
+pub fn bring(client: &Client, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> Result<Locked, Fault> {
+    let half = planned.store.beside("whole");
+    let failed = |error: io::Error| disk(&half, &error);
+    match &planned.what {
+        What::Whole { has_ranges: false } => in_one_answer(client, &planned, &half, told)?,
+        What::Whole { has_ranges: true } => {
+            pieces(client, &planned, told)?;
+            let all = planned.pieces.iter().map(|piece| planned.store.read(*piece));
+            write(&half, |out| all.into_iter().try_for_each(|bytes| out.write_all(&bytes?))).map_err(failed)?;
+        }
+        What::Window { levels, level, chunks, .. } => {
+            pieces(client, &planned, told)?;
+            let bytes = |chunk| planned.store.extent(&planned.pieces, levels.chunk(*level, chunk));
+            write(&half, |out| levels.write(*level, chunks, out, bytes)).map_err(failed)?;
+        }
+    }
+    let hash = File::open(&half).and_then(Fingerprint::of_reader).map_err(failed)?;
+    let len = fs::metadata(&half).map_err(failed)?.len();
+    fs::rename(&half, &planned.path).map_err(|error| disk(&planned.path, &error))?;
+    let window = match &planned.what {
+        What::Window { level, chunks, .. } => Some((*level as u64, chunks.len() as u64)),
+        What::Whole { .. } => None,
+    };
+    let Planned { written, path, etag, total, store, .. } = planned;
+    store.remove().map_err(|error| disk(&path, &error))?;
+    let [date, licence, attribution] = [const { String::new() }; 3];
+    let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let blake3 = hash.to_string();
+    Ok(Locked { address: written, file, len, blake3, etag, remote_len: total, date, window, licence, attribution })
+}
+
+/// Writes a file, down to the disk.
+fn write(path: &Path, put: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let mut out = BufWriter::new(File::create(path)?);
+    put(&mut out)?;
+    out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+}
+
+/// Brings the ranges that are not there yet.
+fn pieces(client: &Client, planned: &Planned, told: &(dyn Fn(u64) + Sync)) -> Result<(), Fault> {
+    let (here, left): (Vec<Piece>, Vec<Piece>) = planned.pieces.iter().partition(|piece| planned.store.has(**piece));
+    let done = AtomicU64::new(here.iter().map(|piece| piece.len).sum());
+    let brought = schedule::for_each_independent(&left, &Workers::new(REQUESTS), client.stop(), |_, &piece| {
+        let answer = client.range(&planned.address, piece.start, piece.len, Some(&planned.etag))?;
+        if answer.bytes.len() as u64 != piece.len || answer.total != planned.total {
+            let text = format!("{}: it has {} bytes now, expected {}", planned.written, answer.total, planned.total);
+            return Err(Fault::hinted(text, "run the same command again"));
+        }
+        planned.store.put(piece, &answer.bytes).map_err(|error| disk(&planned.path, &error))?;
+        told(done.fetch_add(piece.len, Ordering::Relaxed) + piece.len);
+        Ok(())
+    });
+    brought.map(|_| ()).map_err(|error| match error {
+        ScheduleError::Failed { error, .. } => error,
+        ScheduleError::Stopped { .. } => {
+            Fault::hinted("stopped".into(), "run the same command again: what has come is kept")
+        }
+        ScheduleError::NoThread { message, .. } | ScheduleError::Panicked { message, .. } => {
+            Fault::last(format!("{}: {message}", planned.written))
+        }
+    })
+}
+
+/// Brings a file from a server that gives no ranges: it begins anew where it was cut.
+fn in_one_answer(client: &Client, planned: &Planned, half: &Path, told: &(dyn Fn(u64) + Sync)) -> Result<(), Fault> {
+    let once = || {
+        let mut out = File::create(half).map_err(|error| disk(half, &error))?;
+        let mut done = 0;
+        client.whole(&planned.address, planned.total, &mut |bytes| {
+            done += bytes.len() as u64;
+            told(done);
+            out.write_all(bytes).map_err(|error| disk(half, &error))
+        })
+    };
+    (1..TRIES).find_map(|_| once().ok()).map_or_else(once, Ok)
+}

@@ -1,0 +1,192 @@
+//! A job's files, planned and brought one after another, and its lock.
+
+use std::path::{Path, PathBuf};
+
+use exports::Step;
+use job::{Job, Lock, Locked, NamedFile, is_remote};
+
+use super::bring::bring;
+use super::client::Client;
+use super::fault::Fault;
+use super::plan::{Kept, Planned, What, kept, plan};
+use crate::catalogue::{Entry, catalogue, of_address};
+use crate::clock::today;
+use crate::failure::{Failure, Outcome};
+use crate::files::bytes_text;
+use crate::signals::Signals;
+use crate::steps::Steps;
+use crate::{files, terminal};
+
+/// What is to be fetched, and how.
+pub struct Options {
+    /// The job file.
+    pub job: PathBuf,
+    /// Whether only to say what would come.
+    pub dry_run: bool,
+    /// Whether to take what has changed on its server.
+    pub update: bool,
+    /// Gigabytes that may come at most.
+    pub max_gb: f64,
+    /// A file with sources of one's own.
+    pub catalogue: Option<PathBuf>,
+    /// Whether to show no progress.
+    pub quiet: bool,
+}
+
+/// What is to be done about one file of a job.
+enum Task {
+    Keep(Locked),
+    Fetch(Box<Planned>),
+}
+
+/// Fetches what a job names on other machines.
+///
+/// # Errors
+/// When the job is none, a server does not give a file, or it cannot be written.
+pub fn fetch(options: &Options) -> Result<Outcome, Failure> {
+    let job = Job::load_remote(&options.job, &build::ground::find_area)?;
+    let entries = catalogue(options.catalogue.as_deref())?;
+    let named = named_apart(&job);
+    if named.is_empty() {
+        terminal::tell(&format!("{}: all its files are of this machine; nothing to fetch", job.path.display()));
+        return Ok(Outcome::Sound);
+    }
+    let signals = Signals::watch()?;
+    let variable = |name: &str| std::env::var(name).ok();
+    let client = Client::new(signals.stop(), &variable);
+    let failed = |fault: Fault| Failure::new(&fault.text, fault.hint).after(signals.exit_code());
+    let lock = Lock::read(&job.path)?.unwrap_or_default();
+    let tasks = tasks(&client, &job, &named, &lock, options.update).map_err(failed)?;
+    let left = tasks.iter().map(|task| if let Task::Fetch(planned) = task { planned.left() } else { 0 }).sum();
+    tell_plan(&tasks, left, &job)?;
+    if options.dry_run {
+        return Ok(Outcome::Sound);
+    }
+    if options.max_gb * 1.0e9 < left as f64 {
+        let message = format!("{} are to come, expected at most {} GB", bytes_text(left), options.max_gb);
+        return Err(Failure::new(message, "--max-gb allows more; a coarser spacing_m needs fewer"));
+    }
+    files::make_folder(&Lock::folder(&job.path))?;
+    bring_all(&client, &job, tasks, &entries, (options.quiet, left)).map_err(failed)?;
+    let (place, path, came) = (Lock::place(&job.path), job.path.display(), bytes_text(client.received()));
+    terminal::print(&format!("{came} came; {} says what; build it: tiefort build {path}\n", place.display()))?;
+    Ok(Outcome::Sound)
+}
+
+/// The files of other machines, each with the path that it gets here: names that two have are told apart.
+fn named_apart(job: &Job) -> Vec<(NamedFile, PathBuf)> {
+    let folder = Lock::folder(&job.path);
+    let mut named: Vec<(NamedFile, PathBuf)> = Vec::new();
+    for file in job.remote_files() {
+        debug_assert!(is_remote(&file.written), "only those are listed");
+        let last = file.written.rsplit('/').next().unwrap_or_default();
+        let plain: String =
+            last.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
+        let plain = plain.trim_start_matches('.').to_owned();
+        let is_free = |name: &str| !name.is_empty() && named.iter().all(|(_, path)| *path != folder.join(name));
+        let name = (1..).map(|count| if count == 1 { plain.clone() } else { format!("{count}-{plain}") });
+        let name = name.into_iter().find(|name| is_free(name)).expect("one of all numbers is free");
+        named.push((file, folder.join(name)));
+    }
+    named
+}
+
+fn tasks(
+    client: &Client,
+    job: &Job,
+    named: &[(NamedFile, PathBuf)],
+    lock: &Lock,
+    update: bool,
+) -> Result<Vec<Task>, Fault> {
+    let mut tasks = Vec::new();
+    for (file, path) in named {
+        let kept = match kept(client, job, file, lock) {
+            Err(fault) if update && fault.is_change() => Kept::Not,
+            end => end?,
+        };
+        let locked = lock.of(&file.written).filter(|_| kept == Kept::Here);
+        tasks.push(match locked {
+            Some(locked) => Task::Keep(locked.clone()),
+            None => Task::Fetch(Box::new(plan(client, job, file, path.clone())?)),
+        });
+    }
+    Ok(tasks)
+}
+
+/// Says what comes of each file.
+fn tell_plan(tasks: &[Task], left: u64, job: &Job) -> Result<(), Failure> {
+    let mut text = String::new();
+    for task in tasks {
+        text += &match task {
+            Task::Keep(locked) => format!("{}: is here\n", locked.address),
+            Task::Fetch(planned) => format!("{}: {}\n", planned.written, what_comes(planned, job)),
+        };
+    }
+    text += &format!("{} are to come\n", bytes_text(left));
+    terminal::print(&text)?;
+    Ok(())
+}
+
+fn what_comes(planned: &Planned, job: &Job) -> String {
+    let (bytes, total) = (bytes_text(planned.bytes()), bytes_text(planned.total));
+    match &planned.what {
+        What::Whole { .. } => format!("all of it, {total}"),
+        What::Window { chunks, .. } if chunks.is_empty() => {
+            format!("nothing, it lies outside the area; of {total}")
+        }
+        What::Window { level: 0, chunks, .. } => format!("{} tiles, {bytes} of {total}", chunks.len()),
+        What::Window { chunks, spacing_m, .. } => format!(
+            "{} tiles of its overview with posts {spacing_m:.0} m apart, as spacing_m is {}: {bytes} of {total}",
+            chunks.len(),
+            job.area.spacing.metres(),
+        ),
+    }
+}
+
+/// Brings all files, and writes the lock after each: what has come stays.
+fn bring_all(
+    client: &Client,
+    job: &Job,
+    tasks: Vec<Task>,
+    entries: &[Entry],
+    (quiet, left): (bool, u64),
+) -> Result<(), Fault> {
+    let steps = Steps::start(quiet);
+    let (mut lock, mut before) = (Lock { area: job.fetch_area(), files: Vec::new() }, 0);
+    // What is kept is in the lock from the beginning, should the rest be cut.
+    lock.files.extend(tasks.iter().filter_map(|task| match task {
+        Task::Keep(locked) => Some(locked.clone()),
+        Task::Fetch(_) => None,
+    }));
+    write(&lock, &job.path)?;
+    let order = job.remote_files();
+    for task in tasks {
+        let Task::Fetch(planned) = task else { continue };
+        let (own, here) = (planned.left(), planned.bytes() - planned.left());
+        let told = |done: u64| {
+            let done = (before + done.saturating_sub(here)) as usize;
+            steps.tell(Step { what: "bytes came", done, total: left as usize });
+        };
+        let locked = bring(client, *planned, &told)?;
+        before += own;
+        let said = job.remote_rasters().into_iter().find(|raster| raster.written == locked.address);
+        let said = said.and_then(|raster| raster.said.attribution.clone());
+        let entry = of_address(entries, &locked.address);
+        let attribution = said.or_else(|| entry.map(|entry| entry.attribution.clone())).unwrap_or_default();
+        let licence = entry.map(|entry| entry.licence.clone()).unwrap_or_default();
+        lock.files.push(Locked { date: today(), licence, attribution, ..locked });
+        lock.files.sort_by_key(|locked| order.iter().position(|file| file.written == locked.address));
+        write(&lock, &job.path)?;
+    }
+    steps.finish();
+    Ok(())
+}
+
+fn write(lock: &Lock, job: &Path) -> Result<(), Fault> {
+    let text = lock.text();
+    let written = files::write_whole(&Lock::place(job), |out| {
+        use std::io::Write;
+        out.write_all(text.as_bytes())
+    });
+    written.map_err(|failure| Fault::last(failure.message().to_owned()))
+}
