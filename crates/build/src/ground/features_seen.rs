@@ -118,18 +118,23 @@ pub fn features_in(
     let mut keys = [&BUILT_IN_KEYS[..], &OBJECT_KEYS].concat();
     keys.sort_unstable();
     keys.dedup();
-    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &keys, buildings: false, points: false };
-    let read = read_features(path, &wanted, &in_turn)?;
+    let wanted = Wanted { epsg, bounds, layer, crs: None, keys: &keys, buildings: false, points: true };
+    let mut read = read_features(path, &wanted, &in_turn)?;
+    let object = |feature: &VectorFeature| traits(|key| feature.tag(key), (None, None), &[]).map(|(of, _)| of.kind);
+    let is_point = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Point(_));
+    // Crossings, signs and the like are nothing that a job could have left out.
+    let all = read.features.len();
+    read.features.retain(|feature| !is_point(feature) || object(feature).is_some());
+    let found = read.found - (all - read.features.len()) as u64;
+    let mut objects: BTreeMap<ObjectKind, usize> = BTreeMap::new();
+    read.features.iter().filter_map(object).for_each(|kind| *objects.entry(kind).or_default() += 1);
+    read.features.retain(|feature| !is_point(feature));
     let is_polygon = |feature: &VectorFeature| matches!(feature.shape, VectorShape::Polygon(_));
     let first = read.features.first().map(is_polygon);
     let are_polygons = first.filter(|first| read.features.iter().all(|feature| is_polygon(feature) == *first));
-    let object = |feature: &VectorFeature| traits(|key| feature.tag(key), (None, None), &[]).map(|(of, _)| of.kind);
-    let of_objects: Vec<Option<ObjectKind>> = read.features.iter().map(object).collect();
-    let sources: Vec<Source> = read.features.into_iter().map(source_of).collect();
-    let mut objects: BTreeMap<ObjectKind, usize> = BTreeMap::new();
-    of_objects.iter().flatten().for_each(|kind| *objects.entry(*kind).or_default() += 1);
-    let others = sources.iter().zip(&of_objects).filter(|(_, object)| object.is_none()).map(|(source, _)| source);
-    let others: Vec<Source> = others.cloned().collect();
+    let others = read.features.iter().filter(|feature| object(feature).is_none());
+    let others: Vec<Source> = others.map(source_of).collect();
+    let sources: Vec<Source> = read.features.iter().map(source_of).collect();
     let without_kind = overview_of(&others, &[]).unmatched.values().sum();
     let overview = overview_of(&sources, &[]);
     let mut kinds: BTreeMap<Kind, usize> = BTreeMap::new();
@@ -137,7 +142,7 @@ pub fn features_in(
         row.kind.into_iter().for_each(|kind| *kinds.entry(kind).or_default() += row.count);
     }
     Ok(FeaturesSeen {
-        found: read.found,
+        found,
         outside: read.outside,
         kinds: kinds.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
         objects: objects.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
@@ -148,7 +153,7 @@ pub fn features_in(
 }
 
 /// A feature as the table looks at it: its tags, without its shape.
-fn source_of(feature: VectorFeature) -> Source {
+fn source_of(feature: &VectorFeature) -> Source {
     let tags = feature.tags.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect();
     let id = FeatureId { source: 0, numbering: Numbering::Row, number: 0 };
     Source { id, tags, kind: None, shape: Shape::Line(Vec::new()) }

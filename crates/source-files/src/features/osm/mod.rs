@@ -260,17 +260,18 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Places nodes near the area that have a wanted key.
+    /// Places nodes that lie in the area and have a wanted key.
     fn points(&mut self, placing: &mut Placing) -> Result<(), SourceError> {
-        let Self { frames, blocks, keys, nodes, texts, .. } = self;
+        let Self { frames, blocks, keys, texts, .. } = self;
+        let inside = placing.within(0.0);
         for (frame, _) in blocks.iter().filter(|(_, contents)| contents.nodes.is_some()) {
             frames.with_bytes(frame, |bytes| {
                 let block = Block::read(bytes)?;
                 let is_wanted = wanted_texts(&block, keys);
                 let mut known = KnownTexts::of(&block);
                 block.tagged_nodes(|id, place, tags| {
-                    if place != OFF_THE_EARTH && tags.iter().any(|&(key, _)| is_wanted[key]) && nodes.is_near(id) {
-                        let [east, north] = degrees(place);
+                    let [east, north] = degrees(place);
+                    if inside.holds([east, north]) && tags.iter().any(|&(key, _)| is_wanted[key]) {
                         let parts = vec![Part::Point([east, north, f64::NAN])];
                         let shape = RawShape { parts, ..RawShape::default() };
                         let tags = known.tags(&block, tags, texts);
