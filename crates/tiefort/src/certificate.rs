@@ -172,10 +172,11 @@ fn heights(found: &Correlation) -> CertificateSection {
         return CertificateSection { title: "Heights".into(), sentences, ..CertificateSection::default() };
     }
     let [east, north] = figures.largest_at_m;
-    let sentence = format!(
-        "Height of B less that of A, in metres, at {} places; the largest at {east:.1},{north:.1}.",
-        grouped(figures.places)
-    );
+    let largest = match figures.largest_m == 0.0 {
+        true => String::new(),
+        false => format!("; the largest at {east:.1},{north:.1}"),
+    };
+    let sentence = format!("Height of B less that of A, in metres, at {} places{largest}.", grouped(figures.places));
     CertificateSection {
         title: "Heights".into(),
         sentences: vec![sentence],
