@@ -20,7 +20,8 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
             bytes => _ = tiefort_fuzz::file(name, bytes),
         }
     }
-    let wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: true, points: true };
+    let (layer, crs, keys) = (None, None, &BUILT_IN_KEYS);
+    let wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer, crs, keys, buildings: true, points: true };
     if let Ok(file) = read_features(&path, &wanted, &terrain::in_turn) {
         // No record is read twice, and the least of them has twelve bytes.
         assert!(12 * file.found <= shapes.len() as u64, "{} features of {} bytes", file.found, shapes.len());

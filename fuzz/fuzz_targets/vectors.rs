@@ -6,7 +6,8 @@ use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorShape, Wanted, read
 const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &BUILT_IN_KEYS, buildings: true, points: true };
+    let (layer, crs, keys) = (None, None, &BUILT_IN_KEYS);
+    let wanted = Wanted { epsg: 32611, bounds: BOUNDS, layer, crs, keys, buildings: true, points: true };
     let Ok(file) = read_features(&tiefort_fuzz::file("vectors", bytes), &wanted, &terrain::in_turn) else { return };
     check(&file);
 });
@@ -15,6 +16,10 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
 fn check(file: &FeatureFile) {
     for feature in &file.features {
         let runs = match &feature.shape {
+            VectorShape::Point(place) => {
+                assert!(BOUNDS.east[0] <= place[0] && place[0] <= BOUNDS.east[1], "{place:?} lies inside");
+                continue;
+            }
             VectorShape::Line(line) => {
                 assert!(2 <= line.places.len(), "a line has two vertices");
                 std::slice::from_ref(line)

@@ -89,6 +89,8 @@ const DISK_PAGE: (u64, u64) = (6 << 20, 128 << 10);
 
 /// Bytes of the program itself, with the pictures of its page.
 const MEMORY_BASE: u64 = 20 << 20;
+/// Bytes for a map of the page that is drawn; two are drawn at once.
+const MEMORY_DRAWING: u64 = 12 << 20;
 /// Bytes of memory for a post whose windows are kept between stages, and for one on the page.
 const MEMORY_POST: (u64, u64) = (7, 16);
 /// Bytes of memory for a load module: while budgets are shared out, when the report is made, and on the page.
@@ -214,7 +216,7 @@ fn shared_bytes(job: &Job, size: &Size) -> u64 {
     };
     let reported = size.modules * MEMORY_MODULE.1 * job.lod.level_count() as u64;
     let counts = (curves + size.modules * MEMORY_MODULE.0).max(reported);
-    let maps = if size.has_maps_on_page() { size.modules * MEMORY_MODULE.2 } else { 0 };
+    let maps = if size.has_maps_on_page() { 2 * MEMORY_DRAWING + size.modules * MEMORY_MODULE.2 } else { 0 };
     let page = maps + if size.has_ground_on_page() { size.posts * MEMORY_POST.1 } else { 0 };
     let kept = if size.is_kept { size.posts * MEMORY_POST.0 } else { 0 };
     let source = match job.dem.source {

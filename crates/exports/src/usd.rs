@@ -155,10 +155,12 @@ fn put_material(text: &mut String, product: &Product, root: &str, material: Mate
         let _ = write!(
             text,
             "\n            def Shader \"Photo\"\n            {{\n                \
-             uniform token info:id = \"UsdUVTexture\"\n                asset inputs:file = @./{photo}@\n                \
+             uniform token info:id = \"UsdUVTexture\"\n                \
+             asset inputs:file = @./{photo}@\n                \
              float2 inputs:st.connect = </{root}/Materials/{name}/Places.outputs:result>\n                \
              token inputs:wrapS = \"clamp\"\n                token inputs:wrapT = \"clamp\"\n                \
-             token inputs:sourceColorSpace = \"sRGB\"\n                float3 outputs:rgb\n            }}\n\n            \
+             token inputs:sourceColorSpace = \"sRGB\"\n                \
+             float3 outputs:rgb\n            }}\n\n            \
              def Shader \"Places\"\n            {{\n                \
              uniform token info:id = \"UsdPrimvarReader_float2\"\n                \
              string inputs:varname = \"st\"\n                float2 outputs:result\n            }}\n"

@@ -3,7 +3,7 @@
 use features::objects::{ObjectOptions, ObjectRule};
 use terrain::ObjectKind;
 
-use crate::{NamedFile, usual_text};
+use crate::NamedFile;
 
 /// What stands on the ground.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,16 +37,6 @@ pub struct ObjectSource {
     pub least_m: f64,
     /// The same: metres of the side of a cell, of which woods are made.
     pub cell_m: f64,
-}
-
-impl ObjectSource {
-    /// A file of which nothing more is said.
-    pub fn of(file: NamedFile) -> Self {
-        let usual =
-            |key: &str| usual_text(&format!("objects.sources[].{key}")).parse().expect("what holds is a number");
-        let (least_m, cell_m) = (usual("least_m"), usual("cell_m"));
-        Self { file, layer: None, kind: None, height: None, crs: None, least_m, cell_m }
-    }
 }
 
 impl ObjectsSpec {

@@ -4,7 +4,7 @@ use features::objects::ObjectRule;
 
 use crate::setting_list::{List, counted, number, quoted};
 use crate::settings_features::tags_text;
-use crate::{Choice, ObjectSource, ObjectsSpec};
+use crate::{Choice, ObjectSource, ObjectsSpec, usual_text};
 
 /// Adds the settings of `[objects]`.
 pub(crate) fn describe(objects: &ObjectsSpec, list: &mut List) {
@@ -22,14 +22,14 @@ pub(crate) fn describe(objects: &ObjectsSpec, list: &mut List) {
 
 fn source_text(source: &ObjectSource) -> String {
     let ObjectSource { file, layer, kind, height, crs, least_m, cell_m } = source;
-    let usual = ObjectSource::of(file.clone());
     let mut keys = vec![format!("file = {}", quoted(&file.written))];
     keys.extend(layer.as_ref().map(|layer| format!("layer = {}", quoted(layer))));
     keys.extend(kind.map(|kind| format!("kind = {}", quoted(Choice::name(&kind)))));
     keys.extend(height.as_ref().map(|height| format!("height = {}", quoted(height))));
     keys.extend(crs.as_ref().map(|crs| format!("crs = {}", quoted(crs))));
-    keys.extend((*least_m != usual.least_m).then(|| format!("least_m = {}", number(*least_m))));
-    keys.extend((*cell_m != usual.cell_m).then(|| format!("cell_m = {}", number(*cell_m))));
+    for (key, text) in [("least_m", number(*least_m)), ("cell_m", number(*cell_m))] {
+        keys.extend((text != usual_text(&format!("objects.sources[].{key}"))).then(|| format!("{key} = {text}")));
+    }
     if keys.len() == 1 { quoted(&file.written) } else { format!("{{ {} }}", keys.join(", ")) }
 }
 

@@ -169,7 +169,11 @@ impl<'a> Package<'a> {
             return refused(other);
         }
         for part in shape.parts {
-            let Part::Polygon(rings) = part else { return refused("LineString") };
+            let rings = match part {
+                Part::Polygon(rings) => rings,
+                Part::Line(_) => return refused("LineString"),
+                Part::Point(_) => return refused("Point"),
+            };
             let flat = |ring: Vec<[f64; 3]>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
             polygons.push(rings.into_iter().map(flat).collect());
         }

@@ -9,7 +9,7 @@ use super::features::tags;
 use crate::bounds::{FEATURE_SOURCES_MAX, RULES_MAX};
 use crate::entry::{Entry, Section};
 use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
-use crate::{Edges, FeatureSource, FeaturesSpec, JobError, ObjectSource, ObjectsSpec, usual_text};
+use crate::{Edges, FeatureSource, FeaturesSpec, JobError, NamedFile, ObjectSource, ObjectsSpec, usual_text};
 
 pub(super) fn read(
     objects: &Section,
@@ -68,7 +68,7 @@ fn of_features(objects: &Section, features: Option<&FeaturesSpec>) -> Result<Vec
     for source in features.iter().flat_map(|features| &features.sources) {
         let FeatureSource::File { file, layer, kind: _, crs } = source else { continue };
         let (file, layer, crs) = (file.clone(), layer.clone(), crs.clone());
-        let source = ObjectSource { layer, crs, ..ObjectSource::of(file) };
+        let source = ObjectSource { layer, crs, ..plain(file) };
         if !sources.contains(&source) {
             sources.push(source);
         }
@@ -100,9 +100,16 @@ fn sources(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec
     Ok(sources)
 }
 
+/// A file of which nothing more is said.
+fn plain(file: NamedFile) -> ObjectSource {
+    let usual = |key: &str| usual_text(&format!("objects.sources[].{key}")).parse().expect("what holds is a number");
+    let (least_m, cell_m) = (usual("least_m"), usual("cell_m"));
+    ObjectSource { file, layer: None, kind: None, height: None, crs: None, least_m, cell_m }
+}
+
 fn source(item: &Entry, job: &Path) -> Result<ObjectSource, JobError> {
     if !item.is_table() {
-        return Ok(ObjectSource::of(item.file(job)?));
+        return Ok(plain(item.file(job)?));
     }
     let table = item.table()?;
     let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();

@@ -348,10 +348,11 @@ impl Placing {
         Some([east, north, height])
     }
 
-    /// The unit of the heights of a feature that has some; tells those that are no heights.
+    /// The unit of the heights of a feature that has some; tells those that are no heights. Those of points are not
+    /// looked at.
     fn heights(&mut self, id: &str, parts: &[Part]) -> Option<f64> {
         let unit_m = self.height_unit_m;
-        let all = parts.iter().flat_map(Part::runs).flatten();
+        let all = parts.iter().filter(|part| !matches!(part, Part::Point(_))).flat_map(Part::runs).flatten();
         let wrong: Vec<Vertex> = all.clone().filter(|vertex| height_m(vertex, unit_m).is_none()).copied().collect();
         let count = all.count();
         if let Some(first) = wrong.first() {

@@ -4,9 +4,9 @@
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, html};
+use store::Report;
 use terrain::{Each, gather};
 
-use super::Page;
 use super::marks::Marks;
 use crate::picture::{
     Drawing, GREY, Image, Key, Legend, Map, NO_RESIDUAL, NOTHING, RESIDUAL_SCALE_M, Scene, SceneGround, Shown,
@@ -120,8 +120,8 @@ impl Figures {
         [Figure::First, Figure::Features, Figure::Residuals, Figure::Density, Figure::Limits, Figure::Tiles];
 
     /// Draws them; `each` runs one beside the other.
-    pub(super) fn of(page: &Page, scene: &Scene, marks: &Marks, each: Each) -> Self {
-        Self(gather(each, Self::ALL.len(), |number| Self::ALL[number].draw(page, scene, marks)))
+    pub(super) fn of(report: &Report, scene: &Scene, marks: &Marks, each: Each) -> Self {
+        Self(gather(each, Self::ALL.len(), |number| Self::ALL[number].draw(report, scene, marks)))
     }
 
     pub(super) fn get(&self, figure: Figure) -> &Markup {
@@ -140,14 +140,14 @@ impl Figures {
 }
 
 impl Figure {
-    fn draw(self, page: &Page, scene: &Scene, marks: &Marks) -> Markup {
+    fn draw(self, report: &Report, scene: &Scene, marks: &Marks) -> Markup {
         let none = html! {};
         match self {
             Self::First => {
                 let caption = "The compiled surface, as a simulator loads it.";
                 figures(scene, Map::Relief(Shown::Tin), MAP_PIXELS, caption, &marks.over(scene))
             }
-            Self::Features if page.report.features.is_none() && page.report.objects.is_none() => none,
+            Self::Features if report.features.is_none() && report.objects.is_none() => none,
             Self::Features => {
                 let caption =
                     "Where roads and water run, what stands beside them, and where something was wrong with one.";

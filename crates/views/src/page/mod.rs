@@ -61,7 +61,7 @@ pub fn report_html(page: &Page, each: Each) -> String {
     let worst_modules = page.scene.map(worst_modules).unwrap_or_default();
     let worst_ids: Vec<ModuleId> = worst_modules.iter().map(|module| module.id).collect();
     let marks = &Marks::of(report, page.scene, &worst_ids);
-    let figures = page.scene.map(|scene| Figures::of(page, scene, marks, each));
+    let figures = page.scene.map(|scene| Figures::of(report, scene, marks, each));
     let figure = |figure: Figure| figures.as_ref().map(|figures| figures.get(figure));
     let title = page.title.map_or_else(|| format!("Gaming area {}", report.area), str::to_owned);
     let page = html! {
