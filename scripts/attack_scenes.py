@@ -434,7 +434,8 @@ class Network:
         found = []
         for number, (kind, places, tags) in enumerate(self.features):
             place = lambda point: self.grid.place(*point)
-            coordinates = [[place(point) for point in ring] for ring in places] if kind == "Polygon" else \
+            coordinates = place(places) if kind == "Point" else \
+                [[place(point) for point in ring] for ring in places] if kind == "Polygon" else \
                 [place(point) for point in places]
             found.append({"type": "Feature", "id": number, "properties": tags,
                           "geometry": {"type": kind, "coordinates": coordinates}})
@@ -443,12 +444,22 @@ class Network:
         path.write_text(json.dumps({"type": "FeatureCollection", "features": found}))
 
 
+def leaves(draw, shape):
+    """Heights of leaves on the posts of the ground: woods of several heights, clearings, voids, noise."""
+    rows, cols = np.indices(shape)
+    waves = np.sin(rows * draw.uniform(0.1, 2)) + np.cos(cols * draw.uniform(0.1, 2))
+    found = np.maximum(0, QUANTA * draw.choice([4, 12, 200]) * waves)
+    found[(rows + cols) % draw.choice([7, 1000]) == 0] = np.nan
+    return found
+
+
 class Objects(Network):
     """Buildings, walls and woods, some of them bad; drawn apart, so that networks of a seed stay as they are."""
 
     def __init__(self, draw, grid):
         self.draw, self.grid, self.features = draw, grid, []
-        makers = [self.house, self.house, self.house, self.row_of_houses, self.wood, self.wood, self.wall, self.bad]
+        makers = [self.house, self.house, self.house, self.row_of_houses, self.wood, self.wood, self.wall, self.bad,
+                  self.points]
         for _ in range(draw.choice([1, 4, 15, 60])):
             draw.choice(makers)()
 
@@ -491,6 +502,16 @@ class Objects(Network):
         tags = self.draw.choice([{"barrier": "wall"}, {"barrier": "hedge"}, {"natural": "tree_row"},
                                  {"barrier": "city_wall"}])
         self.add("LineString", self.walk(), tags)
+
+    def points(self):
+        """Trees and towers, one over the other, on lines between load modules and outside; and what is no point."""
+        draw, (x, y) = self.draw, self.somewhere()
+        kinds = [{"natural": "tree"}, {"natural": "tree", "height": "30"}, {"man_made": "mast"}, {"power": "tower"},
+                 {"man_made": "cooling_tower", "width": "80"}, {"man_made": "tower", "width": "0"}, {"building": "yes"}]
+        for _ in range(draw.choice([1, 5, 200])):
+            at = draw.choice([(x, y), (500 * round(x / 500), y + draw.uniform(-60, 60)),
+                              (x + draw.uniform(-90, 90), y + draw.uniform(-90, 90))])
+            self.add("Point", at, draw.choice(kinds))
 
     def bad(self):
         (x, y), tags = self.somewhere(0), self.building()
@@ -596,7 +617,12 @@ class Job:
         if not wanted or self.clip:
             return
         draw = random.Random(f"objects of {self.folder.name} {self.tag}")
-        own = {"sources": f'[{{ file = "objects.geojson", crs = "{CRS}" }}]'}
+        sources = [f'{{ file = "objects.geojson", crs = "{CRS}" }}']
+        if draw.random() < 0.3:
+            name, least, cell = f"{self.tag}leaves.asc", draw.choice(["1", "5", "12"]), draw.choice(["4", "12.5", "50"])
+            write_posts(self.folder / name, self.grid, leaves(draw, self.posts.shape))
+            sources.append(f'{{ file = "{name}", crs = "{CRS}", least_m = {least}, cell_m = {cell} }}')
+        own = {"sources": f"[{', '.join(sources)}]"}
         if draw.random() < 0.5:
             self.object_limits = draw.choice([(40, 500), (400, 3000), (100000, 3200000)])
             own["limits"] = "{{ per_load_module = {}, per_4km_square = {} }}".format(*self.object_limits)

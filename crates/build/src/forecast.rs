@@ -10,6 +10,7 @@ use crate::ground::{CACHE_BYTES_MAX, GamingArea, KEPT_POSTS_MAX};
 use job::{Budget as PointBudget, Choice, DemSource, Edges, Job, LodBorder};
 
 use crate::curves::BAND_BYTES_MAX;
+use crate::product::DRAWN_AT_ONCE;
 use crate::refinement::optimising;
 use crate::tasks::{is_surveyed, is_surveyed_in_haste};
 use crate::tins::KEPT_BYTES_MAX;
@@ -89,7 +90,7 @@ const DISK_PAGE: (u64, u64) = (6 << 20, 128 << 10);
 
 /// Bytes of the program itself, with the pictures of its page.
 const MEMORY_BASE: u64 = 20 << 20;
-/// Bytes for a map of the page that is drawn; two are drawn at once.
+/// Bytes for a map of the page that is drawn.
 const MEMORY_DRAWING: u64 = 12 << 20;
 /// Bytes of memory for a post whose windows are kept between stages, and for one on the page.
 const MEMORY_POST: (u64, u64) = (7, 16);
@@ -216,7 +217,11 @@ fn shared_bytes(job: &Job, size: &Size) -> u64 {
     };
     let reported = size.modules * MEMORY_MODULE.1 * job.lod.level_count() as u64;
     let counts = (curves + size.modules * MEMORY_MODULE.0).max(reported);
-    let maps = if size.has_maps_on_page() { 2 * MEMORY_DRAWING + size.modules * MEMORY_MODULE.2 } else { 0 };
+    let maps = if size.has_maps_on_page() {
+        DRAWN_AT_ONCE as u64 * MEMORY_DRAWING + size.modules * MEMORY_MODULE.2
+    } else {
+        0
+    };
     let page = maps + if size.has_ground_on_page() { size.posts * MEMORY_POST.1 } else { 0 };
     let kept = if size.is_kept { size.posts * MEMORY_POST.0 } else { 0 };
     let source = match job.dem.source {

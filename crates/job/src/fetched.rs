@@ -4,10 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::files::{Mention, Place};
+use crate::files::{Mention, Place, all_named};
 use crate::lock::Lock;
 use crate::remote::is_remote;
-use crate::{AreaShape, DemSource, Fault, FeatureSource, Job, JobError, NamedFile, SourceFile, Start};
+use crate::{DemSource, Fault, Job, JobError, NamedFile, SourceFile};
 
 impl Job {
     /// Files of other machines that the job names, each once: what stands for each in messages, and its address. Of a
@@ -15,7 +15,7 @@ impl Job {
     pub fn remote_files(&self) -> Vec<NamedFile> {
         let mut job = self.clone();
         let mut found: Vec<NamedFile> = Vec::new();
-        for (_, written, path) in named(&mut job) {
+        for (_, written, path) in all_named(&mut job) {
             if is_remote(written) && !found.iter().any(|other| other.written == *written) {
                 found.push(NamedFile { written: written.clone(), path: path.clone() });
             }
@@ -37,37 +37,26 @@ impl Job {
     }
 }
 
-/// Every file that a job names: where, its name, and its path.
-fn named(job: &mut Job) -> Vec<(Place, &mut String, &mut PathBuf)> {
-    let mut all = Vec::new();
-    if let DemSource::Files { files, .. } = &mut job.dem.source {
-        let files = files.iter_mut().enumerate();
-        all.extend(files.map(|(index, file)| (Place::Source(index), &mut file.written, &mut file.path)));
-    }
-    let mut files: Vec<(Place, &mut NamedFile)> = Vec::new();
-    for (index, geoid) in job.dem.geoids.iter_mut().enumerate() {
-        files.push((Place::Geoid(index), &mut geoid.file));
-    }
-    files.extend(job.dem.water.iter_mut().map(|water| (Place::Water, &mut water.file)));
-    for (index, area) in job.importance.areas.iter_mut().enumerate() {
-        if let AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } = &mut area.shape {
-            files.push((Place::ImportanceArea(index), file));
+/// Refuses two addresses that differ behind their `?` alone: names, lock and fetched file would be the same.
+///
+/// # Errors
+/// When there are such.
+pub(crate) fn check_apart(job: &mut Job, mentions: &[Mention]) -> Result<(), JobError> {
+    let mut seen: Vec<(String, PathBuf)> = Vec::new();
+    for (place, written, path) in all_named(job) {
+        if seen.iter().any(|(other, at)| other == written && at != path) {
+            let fault = mention_of(place, mentions);
+            let found = format!("{}, which differs from another address behind its ? alone", fault.found);
+            let hint = "what follows a ? is kept out of names, since it may be a signature; fetch one of them by other \
+                        means, and name it by its path";
+            let expected = format!("{} with a name of its own", fault.expected);
+            return Err(JobError::NoSuchFile(Box::new(Fault { found, expected, hint: hint.into(), ..fault.clone() })));
+        }
+        if is_remote(written) {
+            seen.push((written.clone(), path.clone()));
         }
     }
-    if let Some(Start::File(file)) = &mut job.tin.start {
-        files.push((Place::Start, file));
-    }
-    files.extend(job.tin.pins.iter_mut().map(|file| (Place::Pins, file)));
-    for (index, source) in job.features.iter_mut().flat_map(|features| &mut features.sources).enumerate() {
-        if let FeatureSource::File { file, .. } = source {
-            files.push((Place::Features(index), file));
-        }
-    }
-    for (index, source) in job.objects.iter_mut().flat_map(|objects| &mut objects.sources).enumerate() {
-        files.push((Place::Objects(index), &mut source.file));
-    }
-    all.extend(files.into_iter().map(|(place, file)| (place, &mut file.written, &mut file.path)));
-    all
+    Ok(())
 }
 
 /// Puts the fetched files in the places of the addresses that a job names.
@@ -75,12 +64,12 @@ fn named(job: &mut Job) -> Vec<(Place, &mut String, &mut PathBuf)> {
 /// # Errors
 /// When the lock is none, or something is not fetched, or for another area, or changed since.
 pub(crate) fn settle(job: &mut Job, mentions: &[Mention]) -> Result<(), JobError> {
-    if !named(job).iter().any(|(_, written, _)| is_remote(written)) {
+    if !all_named(job).iter().any(|(_, written, _)| is_remote(written)) {
         return Ok(());
     }
     let lock = Lock::read(&job.path)?;
     let (path, area) = (job.path.clone(), job.fetch_area());
-    for (place, written, at) in named(job) {
+    for (place, written, at) in all_named(job) {
         if is_remote(written) {
             let found = fetched(lock.as_ref(), written, &area, &path);
             *at = found.map_err(|reason| unfetched(mention_of(place, mentions), &reason, &path))?;
@@ -121,4 +110,30 @@ fn unfetched(fault: &Fault, reason: &str, job: &Path) -> JobError {
     let hint = format!("a build never touches a network; bring it here: tiefort fetch {}", job.display());
     let expected = format!("{} on this machine", fault.expected);
     JobError::NoSuchFile(Box::new(Fault { found, expected, hint, ..fault.clone() }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_that_differ_behind_their_question_mark_alone_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let load = |second: &str| {
+            let path = folder.path().join("a.toml");
+            let text = format!(
+                "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [0, 0]\nsize_m = [1000, 1000]\nspacing_m = 25\n\
+                 [dem]\nsources = [\"https://a.org/dem.tif?tile=1\", \"https://a.org/{second}\"]\n"
+            );
+            std::fs::write(&path, text).unwrap();
+            Job::load_remote(&path, &|_, _| unreachable!("the job says its area"))
+        };
+        assert_eq!(load("other.tif?tile=1").unwrap().remote_files().len(), 2);
+        assert_eq!(load("dem.tif?tile=1").unwrap().remote_files().len(), 1);
+        let refused = load("dem.tif?tile=2").unwrap_err();
+        assert!(
+            refused.to_string().contains("behind its ? alone") && !refused.to_string().contains("tile="),
+            "{refused}"
+        );
+    }
 }

@@ -66,24 +66,47 @@ pub(crate) fn locate(job: &mut Job, mentions: Vec<Mention>) -> Result<(), JobErr
     locate_sources(&mut job.dem.source, &folder, &mentions)?;
     job.features.as_mut().map_or(Ok(()), |features| locate_features(features, &folder, &mentions))?;
     job.objects.as_mut().map_or(Ok(()), |objects| locate_objects(objects, &folder, &mentions))?;
-    for mention in &mentions {
-        let named = match mention.place {
-            Place::Source(_) | Place::Features(_) | Place::Objects(_) => None,
-            Place::Geoid(index) => Some(&job.dem.geoids[index].file),
-            Place::Water => job.dem.water.as_ref().map(|water| &water.file),
-            Place::ImportanceArea(index) => match &job.importance.areas[index].shape {
-                AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
-                AreaShape::Sample(_) | AreaShape::Slope { .. } => None,
-            },
-            Place::Start => match &job.tin.start {
-                Some(Start::File(file)) => Some(file),
-                Some(Start::Method { .. }) | None => None,
-            },
-            Place::Pins => job.tin.pins.as_ref(),
-        };
-        named.map_or(Ok(()), |file| check_named(file, &folder, mention))?;
+    for (place, written, path) in all_named(job) {
+        // Those of lists are checked with their patterns.
+        if !matches!(place, Place::Source(_) | Place::Features(_) | Place::Objects(_)) {
+            let mention = mentions.iter().find(|mention| mention.place == place).expect("every file is mentioned");
+            check_named((written, path), &folder, mention)?;
+        }
     }
     Ok(())
+}
+
+/// Every file that a job names: where, its name, and its path.
+pub(crate) fn all_named(job: &mut Job) -> Vec<(Place, &mut String, &mut PathBuf)> {
+    let mut all = Vec::new();
+    if let DemSource::Files { files, .. } = &mut job.dem.source {
+        let files = files.iter_mut().enumerate();
+        all.extend(files.map(|(index, file)| (Place::Source(index), &mut file.written, &mut file.path)));
+    }
+    let mut files: Vec<(Place, &mut NamedFile)> = Vec::new();
+    for (index, geoid) in job.dem.geoids.iter_mut().enumerate() {
+        files.push((Place::Geoid(index), &mut geoid.file));
+    }
+    files.extend(job.dem.water.iter_mut().map(|water| (Place::Water, &mut water.file)));
+    for (index, area) in job.importance.areas.iter_mut().enumerate() {
+        if let AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } = &mut area.shape {
+            files.push((Place::ImportanceArea(index), file));
+        }
+    }
+    if let Some(Start::File(file)) = &mut job.tin.start {
+        files.push((Place::Start, file));
+    }
+    files.extend(job.tin.pins.iter_mut().map(|file| (Place::Pins, file)));
+    for (index, source) in job.features.iter_mut().flat_map(|features| &mut features.sources).enumerate() {
+        if let FeatureSource::File { file, .. } = source {
+            files.push((Place::Features(index), file));
+        }
+    }
+    for (index, source) in job.objects.iter_mut().flat_map(|objects| &mut objects.sources).enumerate() {
+        files.push((Place::Objects(index), &mut source.file));
+    }
+    all.extend(files.into_iter().map(|(place, file)| (place, &mut file.written, &mut file.path)));
+    all
 }
 
 /// Checks every file of `dem.sources` and expands its patterns.
@@ -165,32 +188,32 @@ fn named_files(named: &NamedFile, folder: &Path, mention: &Mention) -> Result<Ve
     if has_wildcard(&named.written) && !named.path.exists() {
         return matches_of(&named.written, folder, &mention.fault);
     }
-    check_named(named, folder, mention)?;
+    check_named((&named.written, &named.path), folder, mention)?;
     Ok(vec![named.clone()])
 }
 
-fn check_named(named: &NamedFile, folder: &Path, mention: &Mention) -> Result<(), JobError> {
+fn check_named((written, path): (&str, &Path), folder: &Path, mention: &Mention) -> Result<(), JobError> {
     let fault = &mention.fault;
     let no_such = |found: &str, hint: String| {
         let found = format!("{}, {found}", fault.found);
         JobError::NoSuchFile(Box::new(Fault { found, hint, ..(**fault).clone() }))
     };
-    let Ok(data) = fs::metadata(&named.path) else {
+    let Ok(data) = fs::metadata(path) else {
         return Err(no_such("which cannot be opened", relative_hint(folder)));
     };
     if data.is_dir() {
         return Err(no_such(
             "which is a folder",
-            format!("its files are {}/{}", named.written.trim_end_matches('/'), mention.place.pattern()),
+            format!("its files are {}/{}", written.trim_end_matches('/'), mention.place.pattern()),
         ));
     }
     if !data.is_file() {
         let hint = "a pipe or a device cannot be read twice: copy what it gives into a file".to_owned();
         return Err(no_such("which is a pipe, a socket or a device", hint));
     }
-    if named.path.is_symlink() {
-        let home = named.path.parent().unwrap_or(Path::new("")).to_owned();
-        refuse_outside(&named.path, &home, fault)?;
+    if path.is_symlink() {
+        let home = path.parent().unwrap_or(Path::new("")).to_owned();
+        refuse_outside(path, &home, fault)?;
     }
     Ok(())
 }

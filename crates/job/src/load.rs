@@ -39,7 +39,9 @@ impl Job {
     /// # Errors
     /// As [`Job::load_with`], but for those of files.
     pub fn load_remote(path: &Path, find: &FindArea) -> Result<Job, JobError> {
-        read::read(&text_of(path)?, path, Some(find)).map(|(job, _)| job)
+        let (mut job, mentions) = read::read(&text_of(path)?, path, Some(find))?;
+        fetched::check_apart(&mut job, &mentions)?;
+        Ok(job)
     }
 
     fn load_asking(path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
@@ -48,6 +50,7 @@ impl Job {
 
     fn of_text_asking(text: &str, path: &Path, find: Option<&FindArea>) -> Result<Job, JobError> {
         let (mut job, mentions) = read::read(text, path, find)?;
+        fetched::check_apart(&mut job, &mentions)?;
         fetched::settle(&mut job, &mentions)?;
         files::locate(&mut job, mentions)?;
         Ok(job)

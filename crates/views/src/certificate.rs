@@ -3,10 +3,10 @@
 
 use std::fmt::Write;
 
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
-use crate::page::table;
+use crate::page::{document, table};
 use crate::picture::palette;
 use crate::table::{Align, Table, fold};
 
@@ -81,27 +81,14 @@ pub fn certificate_text(certificate: &Certificate) -> String {
 /// The certificate as a page: one file that loads nothing and runs nothing.
 pub fn certificate_html(certificate: &Certificate) -> String {
     let Certificate { title, verdict: (is_good, verdict), sections, map } = certificate;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                title { (title) }
-                style { (PreEscaped(include_str!("page/style.css"))) }
-            }
-            body {
-                h1 { (title) }
-                div.verdict.breached[!is_good] { p { b { (verdict) } } }
-                main {
-                    @for section in sections { section { h2 { (section.title) } (body(section)) } }
-                    @if let Some(map) = map { section { h2 { (map.title) } (picture(map)) } }
-                }
-            }
+    let found = html! {
+        div.verdict.breached[!is_good] { p { b { (verdict) } } }
+        main {
+            @for section in sections { section { h2 { (section.title) } (body(section)) } }
+            @if let Some(map) = map { section { h2 { (map.title) } (picture(map)) } }
         }
     };
-    page.into_string()
+    document(title, &found)
 }
 
 fn body(section: &CertificateSection) -> Markup {

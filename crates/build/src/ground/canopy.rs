@@ -13,7 +13,7 @@ const SAMPLES: i32 = 4;
 /// Rows of cells that are read at once.
 const STRIP: i32 = 32;
 
-/// The woods of a raster in the area, and a word where there are none; `each` runs strips of rows.
+/// The woods of a raster in the area; `each` runs strips of rows.
 ///
 /// # Errors
 /// When the file is no raster of heights, cannot be read, or lies elsewhere.

@@ -30,4 +30,5 @@ pub use told::{Told, read_told, told};
 mod drape;
 pub use drape::{Drape, DrapedArea, SQUARE_PIXELS};
 mod page;
+pub(crate) use page::DRAWN_AT_ONCE;
 pub use page::{page, page_without_maps};

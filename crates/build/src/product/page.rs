@@ -7,11 +7,14 @@ use views::{Page, PageSetting, Scene, report_html};
 
 use crate::product::{Opened, Product, SceneParts};
 
+/// Maps of a page that are drawn at once, however many workers there are: each takes memory of its own.
+pub(crate) const DRAWN_AT_ONCE: usize = 2;
+
 /// The page of a database, its maps drawn by so many workers.
 pub fn page(product: &Product, report: &Report, workers: usize) -> String {
     let parts = SceneParts::new(product, Some(product.limit_use()), Some(report));
     let scene = parts.scene(product, product.part, &product.modules);
-    drawn(&product.job, &product.manifest, report, Some(&scene), &Workers::new(workers))
+    drawn(&product.job, &product.manifest, report, Some(&scene), &Workers::new(workers.min(DRAWN_AT_ONCE)))
 }
 
 /// The page of a database whose load modules are too many to be drawn.

@@ -16,8 +16,6 @@ use super::plan::{Planned, What, disk};
 
 /// Requests at a time.
 const REQUESTS: usize = 8;
-/// Times that a file which comes in one answer is asked for.
-const TRIES: u32 = 3;
 
 /// Brings a file; `told` hears of every range, with the bytes that have come of the file.
 ///
@@ -88,7 +86,7 @@ fn pieces(client: &Client, planned: &Planned, told: &(dyn Fn(u64) + Sync)) -> Re
 
 /// Brings a file from a server that gives no ranges: it begins anew where it was cut.
 fn in_one_answer(client: &Client, planned: &Planned, half: &Path, told: &(dyn Fn(u64) + Sync)) -> Result<(), Fault> {
-    let once = || {
+    client.trying(|| {
         let mut out = File::create(half).map_err(|error| disk(half, &error))?;
         let mut done = 0;
         client.whole(&planned.address, planned.total, &mut |bytes| {
@@ -96,6 +94,5 @@ fn in_one_answer(client: &Client, planned: &Planned, half: &Path, told: &(dyn Fn
             told(done);
             out.write_all(bytes).map_err(|error| disk(half, &error))
         })
-    };
-    (1..TRIES).find_map(|_| once().ok()).map_or_else(once, Ok)
+    })
 }

@@ -151,7 +151,10 @@ impl<'a> Client<'a> {
     }
 
     /// Asks several times where that may help.
-    fn trying<T>(&self, ask: impl Fn() -> Result<T, Fault>) -> Result<T, Fault> {
+    ///
+    /// # Errors
+    /// That of the last try, or of the first that another would not mend.
+    pub fn trying<T>(&self, ask: impl Fn() -> Result<T, Fault>) -> Result<T, Fault> {
         let mut pause = PAUSE;
         for _ in 1..TRIES {
             self.stopped()?;

@@ -64,6 +64,55 @@ pub fn report_html(page: &Page, each: Each) -> String {
     let figures = page.scene.map(|scene| Figures::of(report, scene, marks, each));
     let figure = |figure: Figure| figures.as_ref().map(|figures| figures.get(figure));
     let title = page.title.map_or_else(|| format!("Gaming area {}", report.area), str::to_owned);
+    let body = html! {
+        p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
+        div.first[page.scene.is_some()] {
+            @if let Some(first) = figure(Figure::First) { div { (first) } }
+            div {
+                (tables::verdict(report))
+                @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
+                (headline(page))
+                nav {
+                    @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
+                }
+            }
+        }
+        main {
+            section id="limits" { h2 { "Limits" } (tables::limits(report, marks)) (tables::advice(report)) }
+            section id="residuals" {
+                h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
+            }
+            @if let Some(features) = &report.features {
+                section id="features" {
+                    h2 { "Roads and water" } (tables::features(features))
+                    @if let Some(map) = figure(Figure::Features) { (map) }
+                }
+            }
+            @if let Some(objects) = &report.objects {
+                section id="objects" {
+                    h2 { "Buildings and woods" } (tables::objects(objects))
+                    @if let (None, Some(map)) = (&report.features, figure(Figure::Features)) { (map) }
+                }
+            }
+            @match page.scene.zip(figures.as_ref()) {
+                Some((scene, figures)) => {
+                    section.whole id="maps" { h2 { "Maps" } (figures.maps()) }
+                    section.whole id="worst" {
+                        h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
+                    }
+                }
+                None => section id="maps" { h2 { "Maps" } (without_maps()) }
+            }
+            section id="breaches" { h2 { "Breaches" } (tables::breaches(report, marks)) }
+            section id="times" { h2 { "Times" } (tables::stages(report)) }
+            section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
+        }
+    };
+    document(&title, &body)
+}
+
+/// One file that loads nothing and runs nothing, in the style of all pages.
+pub(crate) fn document(title: &str, body: &Markup) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -74,51 +123,7 @@ pub fn report_html(page: &Page, each: Each) -> String {
                 title { (title) }
                 style { (PreEscaped(include_str!("style.css"))) }
             }
-            body {
-                h1 { (title) }
-                p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
-                div.first[page.scene.is_some()] {
-                    @if let Some(first) = figure(Figure::First) { div { (first) } }
-                    div {
-                        (tables::verdict(report))
-                        @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
-                        (headline(page))
-                        nav {
-                            @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
-                        }
-                    }
-                }
-                main {
-                    section id="limits" { h2 { "Limits" } (tables::limits(report, marks)) (tables::advice(report)) }
-                    section id="residuals" {
-                        h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
-                    }
-                    @if let Some(features) = &report.features {
-                        section id="features" {
-                            h2 { "Roads and water" } (tables::features(features))
-                            @if let Some(map) = figure(Figure::Features) { (map) }
-                        }
-                    }
-                    @if let Some(objects) = &report.objects {
-                        section id="objects" {
-                            h2 { "Buildings and woods" } (tables::objects(objects))
-                            @if let (None, Some(map)) = (&report.features, figure(Figure::Features)) { (map) }
-                        }
-                    }
-                    @match page.scene.zip(figures.as_ref()) {
-                        Some((scene, figures)) => {
-                            section.whole id="maps" { h2 { "Maps" } (figures.maps()) }
-                            section.whole id="worst" {
-                                h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
-                            }
-                        }
-                        None => section id="maps" { h2 { "Maps" } (without_maps()) }
-                    }
-                    section id="breaches" { h2 { "Breaches" } (tables::breaches(report, marks)) }
-                    section id="times" { h2 { "Times" } (tables::stages(report)) }
-                    section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
-                }
-            }
+            body { h1 { (title) } (body) }
         }
     };
     page.into_string()
