@@ -64,9 +64,10 @@ pub fn job_text(
     );
     let sources = sources(entry, &corners(&area)?);
     terminal::tell(&format!(
-        "{}: {} files of {}; heights above {}; a {} model",
+        "{}: {} {} of {}; heights above {}; a {} model",
         entry.name,
         sources.len(),
+        if sources.len() == 1 { "file" } else { "files" },
         entry.title,
         entry.datum,
         entry.model
