@@ -446,8 +446,17 @@ fn clients_that_do_not_read_make_place_for_others() {
     };
     let clients: Vec<TcpStream> = (0..50).map(|_| ask()).collect();
     let start = Instant::now();
-    assert_eq!(server.get("/databases.json").status, 200);
-    assert!(start.elapsed() < Duration::from_secs(3), "an answer after {:?}", start.elapsed());
+    // While all places have an answer in the making, others are told to come again; a machine that is busy takes longer.
+    loop {
+        let answer = server.get("/databases.json");
+        if answer.status == 200 {
+            break;
+        }
+        answer.check_refusal(503, &["found all places taken", "--max-clients"]);
+        assert_eq!(answer.header("retry-after"), "1");
+        assert!(start.elapsed() < ENOUGH, "no answer after {:?}", start.elapsed());
+        std::thread::sleep(Duration::from_millis(20));
+    }
     drop(clients);
 }
 
