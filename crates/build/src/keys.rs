@@ -2,7 +2,7 @@
 //! decided whether it counts.
 
 use crate::ground::{GamingArea, Surroundings, Window, feed_post};
-use features::objects::Plan;
+use features::objects::{ObjectLimits, Plan};
 use features::{AreaFeatures, Clearances, FallOptions, GradeOptions, Outline, Place, Sounded};
 use job::{Borders, ClipHeights, Edges, FeaturesSpec, Job, LodBorder, LodSpec, ModulesSpec, ObjectsSpec, OuterBorder};
 use store::engine::{Fingerprint, FingerprintBuilder, Key, Part, Stamp};
@@ -51,9 +51,14 @@ const MODULES: Part = Part { name: "modules", changed: "the load modules changed
 /// How they are measured.
 const MEASURE: Part = Part { name: "measure", changed: "what is measured changed" };
 
-/// Of what stands on the ground of an area: what the job says of it, where the area lies, the files, and what woods
-/// leave free.
-pub(crate) fn outlines(job: &Job, spec: &ObjectsSpec, records: &[SourceRecord], free: &[Plan]) -> Key {
+/// Of what stands on the ground of an area: what the job says of it, where the area lies, the files, what woods leave
+/// free, and limits that are not the job's own.
+pub(crate) fn outlines(
+    job: &Job,
+    spec: &ObjectsSpec,
+    records: &[SourceRecord],
+    (free, limits): (&[Plan], Option<&ObjectLimits>),
+) -> Key {
     let is_ours = |record: &&SourceRecord| spec.sources.iter().any(|source| source.file.written == record.path);
     let files: Vec<Fingerprint> = records.iter().filter(is_ours).map(|record| record.blake3).collect();
     let settings: Vec<String> = job
@@ -69,10 +74,15 @@ pub(crate) fn outlines(job: &Job, spec: &ObjectsSpec, records: &[SourceRecord], 
         let part = part.number(job.area.epsg.into()).number(job.area.spacing.sixteenths().into());
         let part = job.area.origin_m.into_iter().fold(part, FingerprintBuilder::real);
         let part = part.number(rows.into()).number(cols.into()).signed(side_cells.into());
-        part.list(free.iter(), |part, plan| {
+        let part = part.list(free.iter(), |part, plan| {
             part.list(plan.iter(), |part, ring| {
                 part.list(ring.iter(), |part, [east, north]| part.signed((*east).into()).signed((*north).into()))
             })
+        });
+        limits.into_iter().fold(part, |part, limits| {
+            let ObjectLimits { modules, windows, area, size: _, window: _ } = limits;
+            let each = |part: FingerprintBuilder, most: &u32| part.number((*most).into());
+            part.list(modules.iter(), each).list(windows.iter(), each).number(*area)
         })
     })
 }

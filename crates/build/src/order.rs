@@ -3,7 +3,8 @@
 //! ```text
 //!   profile r02c03 ─► level ─┐    (with roads, rivers or lakes)
 //!   survey r02c03 ◄──────────┘
-//!   outlines ─► assemble r02c03              (with buildings, walls or woods)
+//!   outlines ─► assemble r02c03              (with buildings, walls or woods; where they count in the limits of the
+//!                                             ground, level ─► outlines ─► survey r02c03)
 //!   survey r02c03 ─► allocate ─► refine r02c03 (after its lower-ranked neighbours) ─► assemble r02c03 ─► publish
 //! ```
 
@@ -79,20 +80,23 @@ pub fn units(stage: Stage, job: &Job, area: &GamingArea) -> Vec<Unit> {
 pub fn needs(unit: Unit, job: &Job, area: &GamingArea) -> Vec<Unit> {
     let all = |stage| units(stage, job, area);
     // Features are part of the ground of every later stage, so each of them waits where that has to be decided again.
-    let and_level = |needs: Vec<Unit>| all(Stage::Level).into_iter().chain(needs).collect();
+    let is_joint = job.objects.as_ref().is_some_and(|objects| objects.joint);
+    let settled = || all(Stage::Level).into_iter().chain(if is_joint { all(Stage::Outlines) } else { Vec::new() });
+    let and_settled = |needs: Vec<Unit>| settled().chain(needs).collect();
     match (unit.stage, unit.tile) {
         (Stage::Level, _) => all(Stage::Profile),
-        (Stage::Survey, _) => all(Stage::Level),
-        (Stage::Allocate, _) => and_level(all(Stage::Survey)),
+        (Stage::Outlines, _) if is_joint => all(Stage::Level),
+        (Stage::Survey, _) => settled().collect(),
+        (Stage::Allocate, _) => and_settled(all(Stage::Survey)),
         (Stage::Refine, Some(tile)) => {
             let lower = |other: &TileId| area.tiling.rank(*other) < area.tiling.rank(tile);
             let neighbours = area.tiling.neighbours(tile).into_iter().filter(lower);
             let inherited = neighbours.map(|other| Unit::of(Stage::Refine, other));
-            and_level(all(Stage::Allocate).into_iter().chain(inherited).collect())
+            and_settled(all(Stage::Allocate).into_iter().chain(inherited).collect())
         }
         (Stage::Assemble, Some(tile)) => {
             let tins = around(tile, job, area).into_iter().map(|other| Unit::of(Stage::Refine, other));
-            and_level(all(Stage::Outlines).into_iter().chain(tins).collect())
+            all(Stage::Level).into_iter().chain(all(Stage::Outlines)).chain(tins).collect()
         }
         (Stage::Publish, _) => all(Stage::Assemble),
         _ => Vec::new(),

@@ -1,16 +1,16 @@
 //! The stage `outlines`: what stands on the ground of the area and has room, before its heights are known. It sees
 //! vectors, never a raster.
 
-use std::sync::Arc;
-
 use features::objects::{Claims, Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Plan, Wanting, mended};
 use job::{Job, ObjectsSpec};
 use schedule::{Workers, for_each_piece};
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use store::{
-    AreaOutlines, FeatureRemark, FileStamp, ModuleOutlines, ObjectLeftOut, ObjectSums, ReportObjectLimit, ReportObjects,
+    AreaOutlines, FeatureRemark, FileStamp, ModuleOutlines, ObjectLeftOut, ObjectSums, ReportObjectLimit,
+    ReportObjects, ReportPlace,
 };
 use terrain::Each;
+use tin::tiling::Budget;
 
 use crate::budgets::Budgets;
 use crate::ground::{FoundObjects, GamingArea};
@@ -27,7 +27,7 @@ pub(crate) fn decide_objects(run: &mut Run, progress: &mut dyn Progress) -> Resu
     let (file, outlines) = outlines_area(run)?.into_inner();
     progress.tell(Event::Leave(Stage::Outlines));
     outlines.notes.iter().for_each(|note| progress.tell(Event::Note(note.clone())));
-    run.outlines = Some((file, Arc::new(outlines)));
+    run.stand(file, outlines);
     Ok(())
 }
 
@@ -35,7 +35,9 @@ pub(crate) fn decide_objects(run: &mut Run, progress: &mut dyn Progress) -> Resu
 pub(crate) fn outlines_area(run: &Run) -> Result<Outcome<(FileStamp, AreaOutlines)>, CompileError> {
     let spec = run.job.objects.as_ref().expect("a stage of jobs with objects");
     let free = if run.job.features.is_some() { run.features()?.features.covered() } else { Vec::new() };
-    keep_or_make(&Outlining { run, spec, free }, ALGORITHM_REVISION)
+    // What objects themselves have already been granted is not taken off.
+    let limits = limits_of(spec, &Budget { reserved: run.reserved_by_features(), ..run.area.budget.clone() });
+    keep_or_make(&Outlining { run, spec, free, limits }, ALGORITHM_REVISION)
 }
 
 /// What stands on the ground, as the engine asks for it.
@@ -44,6 +46,7 @@ struct Outlining<'a> {
     spec: &'a ObjectsSpec,
     /// What woods leave free.
     free: Vec<Plan>,
+    limits: ObjectLimits,
 }
 
 impl Artifact for Outlining<'_> {
@@ -51,7 +54,8 @@ impl Artifact for Outlining<'_> {
     type Error = CompileError;
 
     fn key(&self) -> Key {
-        keys::outlines(self.run.job, self.spec, &self.run.records, &self.free)
+        let limits = self.spec.joint.then_some(&self.limits);
+        keys::outlines(self.run.job, self.spec, &self.run.records, (&self.free, limits))
     }
 
     fn published(&self) -> Result<Option<Stamp>, CompileError> {
@@ -65,14 +69,15 @@ impl Artifact for Outlining<'_> {
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaOutlines), CompileError> {
         let each: Each = &|count, piece| for_each_piece(&self.run.workers, count, piece);
-        let outlines = outlines_of(self.run.job, (self.spec, &self.free), &self.run.area, each)?;
+        let outlines = outlines_of(self.run.job, (self.spec, &self.free, &self.limits), &self.run.area, each)?;
         Ok((self.run.database.write_outlines(stamp, &outlines)?, outlines))
     }
 }
 
 /// The objects of a job, on which limits are tried.
 pub struct ObjectBudgets {
-    limits: ObjectLimits,
+    spec: ObjectsSpec,
+    budget: Budget,
     claims: Claims,
 }
 
@@ -109,41 +114,50 @@ impl ObjectBudgets {
         let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
         let found = FoundObjects::read(job, spec, &area, &each)?;
         let free = features.map_or_else(Vec::new, Budgets::covered);
-        let (outlines, limits) = (mended(found.objects, &spec.options).0, limits_of(job, spec));
+        let outlines = mended(found.objects, &spec.options).0;
+        let limits = limits_of(spec, &area.budget);
         let claims = Claims::of(&outlines, &free, limits.size, job.modules.side_quanta.into());
-        Ok(Some(Self { limits, claims }))
+        Ok(Some(Self { spec: spec.clone(), budget: area.budget, claims }))
     }
 
     /// What would be kept with so many polygons in a load module, and 32 times as many in a square of 4 km.
     pub fn of(&self, per_load_module: u32) -> ObjectBudget {
-        let limits = ObjectLimits { per_module: per_load_module, per_window: 32 * per_load_module, ..self.limits };
-        let kinds = self.claims.kept(&limits).into_iter().map(sums_of).collect();
-        ObjectBudget { per_load_module, per_window: limits.per_window, kinds }
+        let spec = ObjectsSpec { per_load_module, per_4km_square: 32 * per_load_module, ..self.spec.clone() };
+        let kinds = self.claims.kept(&limits_of(&spec, &self.budget)).into_iter().map(sums_of).collect();
+        ObjectBudget { per_load_module, per_window: spec.per_4km_square, kinds }
     }
 }
 
 /// What stands on the ground of a job's area within its limits.
 pub(crate) fn outlines_of(
     job: &Job,
-    (spec, free): (&ObjectsSpec, &[Plan]),
+    (spec, free, limits): (&ObjectsSpec, &[Plan], &ObjectLimits),
     area: &GamingArea,
     each: Each,
 ) -> Result<AreaOutlines, CompileError> {
     let FoundObjects { objects: found, remarks, notes } = FoundObjects::read(job, spec, area, each)?;
     let (outlines, mended) = mended(found, &spec.options);
-    let limits = limits_of(job, spec);
-    let granted = Claims::of(&outlines, free, limits.size, job.modules.side_quanta.into()).granted(&limits);
+    let granted = Claims::of(&outlines, free, limits.size, job.modules.side_quanta.into()).granted(limits);
     Ok(AreaOutlines { notes, ..to_outlines(job, granted, mended, remarks) })
 }
 
-/// The limits of objects in a job.
-pub(crate) fn limits_of(job: &Job, spec: &ObjectsSpec) -> ObjectLimits {
-    ObjectLimits {
-        per_module: spec.per_load_module,
-        per_window: spec.per_4km_square,
-        size: [job.area.grid.rows, job.area.grid.cols].map(|count| count as i32),
-        window: [job.limits.window.rows, job.limits.window.cols].map(|count| count as i32),
+/// The limits of objects in a job. Where they count together with the ground, they take at most half of what the points
+/// that every build starts from and features leave in each load module, in each window and in the area.
+fn limits_of(spec: &ObjectsSpec, budget: &Budget) -> ObjectLimits {
+    let (grid, windows) = (budget.grid, &budget.windows);
+    let pair = |rows: u32, cols: u32| [rows as i32, cols as i32];
+    let most = [spec.per_load_module, spec.per_4km_square];
+    let mut limits = ObjectLimits::even(most, pair(grid.rows, grid.cols), pair(windows.rows, windows.cols));
+    if spec.joint {
+        let start = budget.start();
+        let lower = |most: &mut u32, limit: u32, start: u32| *most = (*most).min(limit.saturating_sub(start) / 2);
+        limits.modules.iter_mut().zip(&start).for_each(|(most, &start)| lower(most, budget.per_module, start));
+        for (origin, start) in windows.origins.iter().zip(windows.sums(grid, &start)) {
+            lower(&mut limits.windows[grid.index(origin)], budget.per_window, start);
+        }
+        limits.area = budget.area.saturating_sub(budget.start_total()) / 2;
     }
+    limits
 }
 
 fn sums_of((kind, [kept, wanted]): (terrain::ObjectKind, [ObjectTally; 2])) -> ObjectSums {
@@ -181,11 +195,13 @@ fn to_outlines(
         degrades: false,
     }));
     let wanting = |Wanting { kind, at_m, height_m, silhouette_m2, full }: Wanting| {
-        let (is_window, full) = match full {
-            Full::Module(module) => (false, module),
-            Full::Window(window) => (true, window),
+        // Those beyond the area are granted nothing.
+        let full = match full {
+            Full::Module(module) => ReportPlace::Module(module.map(|at| at as u32)),
+            Full::Window(window) => ReportPlace::Window(window.map(|at| at as u32)),
+            Full::Area => ReportPlace::Area,
         };
-        ObjectLeftOut { kind: kind.name().to_owned(), at_m: map(at_m), height_m, silhouette_m2, is_window, full }
+        ObjectLeftOut { kind: kind.name().to_owned(), at_m: map(at_m), height_m, silhouette_m2, full }
     };
     let module = |([row, col], objects): ([i32; 2], terrain::Objects)| ModuleOutlines {
         // Those beyond the area are granted nothing.
@@ -207,10 +223,7 @@ fn to_outlines(
 pub(crate) fn objects_report(run: &Run, outlines: &AreaOutlines) -> ReportObjects {
     let spec = run.job.objects.as_ref().expect("a stage of jobs with objects");
     let grid = run.area.grid;
-    let mut counts = vec![0_u32; grid.count()];
-    for ModuleOutlines { row, col, objects } in &outlines.modules {
-        counts[(row * grid.cols + col) as usize] = objects.polygons() as u32;
-    }
+    let counts = outlines.counts(grid);
     let sums = run.area.budget.windows.sums(grid, &counts);
     ReportObjects {
         kinds: outlines.kinds.clone(),

@@ -158,7 +158,9 @@ impl Findings<'_> {
     }
 
     fn counts(&self) -> Vec<u32> {
-        self.by_module().iter().map(|numbers| counted(self.run, numbers)).collect()
+        let mut counts: Vec<u32> = self.by_module().iter().map(|numbers| counted(self.run, numbers)).collect();
+        counts.iter_mut().zip(self.run.joint_objects()).for_each(|(count, objects)| *count += objects);
+        counts
     }
 
     fn points(&self) -> ReportPoints {

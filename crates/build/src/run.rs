@@ -148,12 +148,41 @@ impl Run<'_> {
 
     /// From now on, features are part of the ground, and what they take of the limits is taken.
     pub fn settle(&mut self, file: FileStamp, level: AreaLevel) {
-        self.area.budget.reserved = level.reserved_of(self.area.grid.count());
         let left_out_weight = self.job.features.as_ref().map_or(1.0, |spec| spec.left_out_weight);
         self.ground.burn_in(self.database.folder(), &self.area, left_out_weight);
         self.read = OnceLock::new();
         let left_out = LeftOut::of(self.job, &self.area, &level);
         self.level = Some(Settled { file, level, left_out });
+        self.area.budget.reserved = self.reserved();
+    }
+
+    /// From now on it is decided what stands on the ground, and what of it counts in the limits is taken from them.
+    pub fn stand(&mut self, file: FileStamp, outlines: AreaOutlines) {
+        self.outlines = Some((file, Arc::new(outlines)));
+        self.area.budget.reserved = self.reserved();
+    }
+
+    /// Triangles of each load module that features take, row by row; empty without features.
+    pub fn reserved_by_features(&self) -> Vec<u32> {
+        let count = self.area.grid.count();
+        self.level.as_ref().map_or_else(Vec::new, |settled| settled.level.reserved_of(count))
+    }
+
+    /// Polygons of each load module that count in its limits beside those of the ground, row by row; empty where none
+    /// do.
+    pub fn joint_objects(&self) -> Vec<u32> {
+        let is_joint = self.job.objects.as_ref().is_some_and(|objects| objects.joint);
+        let outlines = self.outlines.as_ref().filter(|_| is_joint);
+        outlines.map_or_else(Vec::new, |(_, outlines)| outlines.counts(self.area.grid))
+    }
+
+    fn reserved(&self) -> Vec<u32> {
+        let (features, objects) = (self.reserved_by_features(), self.joint_objects());
+        match (features.is_empty(), objects.is_empty()) {
+            (_, true) => features,
+            (true, false) => objects,
+            (false, false) => features.iter().zip(objects).map(|(&features, objects)| features + objects).collect(),
+        }
     }
 
     /// What coarser levels leave out of features, in jobs where they do.
@@ -175,7 +204,7 @@ impl Run<'_> {
         };
         let fewer = fewer.filter(|(asked, fit)| fit < asked).map(|(asked, fit)| {
             format!(
-                "tin.points: {asked} are asked for, and beside roads and water {fit} fit limits.mean_per_load_module"
+                "tin.points: {asked} are asked for, and beside roads, water and objects {fit} fit limits.mean_per_load_module"
             )
         });
         self.ground.warnings.iter().chain(of_features).cloned().chain(fewer).collect()

@@ -72,10 +72,12 @@ impl<'a> Session<'a> {
             return Err(not_ready(unit, need));
         }
         let Unit { stage, tile } = unit;
-        if !matches!(stage, Stage::Profile | Stage::Level | Stage::Outlines) {
+        let is_joint = self.run.job.objects.as_ref().is_some_and(|objects| objects.joint);
+        let before_ground = matches!(stage, Stage::Profile | Stage::Level);
+        if !before_ground && (stage != Stage::Outlines || is_joint) {
             self.take_features(unit)?;
         }
-        if stage == Stage::Assemble {
+        if stage == Stage::Assemble || is_joint && !before_ground && stage != Stage::Outlines {
             self.take_outlines(unit)?;
         }
         if let Some(tile) = tile {
@@ -132,7 +134,7 @@ impl<'a> Session<'a> {
         let marked = self.work.marks().marked(&outlines.to_string());
         match self.run.database.folder().read_outlines() {
             Ok((_, file, read)) if Some(file.blake3) == marked => {
-                self.run.outlines = Some((file, Arc::new(read)));
+                self.run.stand(file, read);
                 Ok(())
             }
             _ => Err(self.spoilt(unit, outlines)),

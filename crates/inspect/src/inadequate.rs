@@ -98,7 +98,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let tolerance_m = tolerance_m.unwrap_or(3.0 * rms_m / f64::from(terrain::QUANTA_PER_METRE));
     let heaviest = heaviest(&window.importance, job.dem.water.as_ref().map(|water| water.class));
     let residual_m = weighted(modules.values(), &area, &window, heaviest);
-    let counts: Vec<u32> = modules.values().map(|module| job.limits.count.of(module)).collect();
+    let counts: Vec<u32> = modules.values().map(|module| job.counted(module)).collect();
     let mut refused = BTreeSet::new();
     for &tile in &area.tiles {
         refused.extend(folder.read_tile(tile)?.1.refused.iter().map(|refusal| refusal.post));

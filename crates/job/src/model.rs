@@ -255,14 +255,16 @@ pub enum Count {
     Polygons,
 }
 
-impl Count {
-    /// What a load module has of that: all that is compared with a limit is counted here, decks too.
-    pub fn of(self, module: &LoadModule) -> u32 {
+impl Job {
+    /// What a load module has of what limits count: decks too, and objects where they count together with the ground.
+    pub fn counted(&self, module: &LoadModule) -> u32 {
         let counts = module.counts();
-        match self {
-            Self::Triangles => counts.triangles,
-            Self::Polygons => counts.polygons,
-        }
+        let ground = match self.limits.count {
+            Count::Triangles => counts.triangles,
+            Count::Polygons => counts.polygons,
+        };
+        let is_joint = self.objects.as_ref().is_some_and(|objects| objects.joint);
+        ground + if is_joint { module.objects.polygons() as u32 } else { 0 }
     }
 }
 

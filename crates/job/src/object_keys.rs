@@ -25,7 +25,7 @@ pub(crate) const OBJECTS: &[Key] = &[
         .number("square metres", OBJECT_AREA_M2)
         .usual("20"),
     Key::new("limits", "how many of them there may be")
-        .form("a table of per_load_module and per_4km_square")
+        .form("a table of per_load_module, per_4km_square and joint")
         .otherwise("what holds of each of its keys")
         .example("limits = { per_load_module = 800, per_4km_square = 25600 }"),
 ];
@@ -35,6 +35,8 @@ pub(crate) const OBJECT_LIMITS: &[Key] = &[
         .whole("polygons", OBJECT_LIMIT)
         .usual("400"),
     Key::new("per_4km_square", "the same in every square of 4 km").whole("polygons", OBJECT_LIMIT).usual("12800"),
+    Key::new("joint", "count them in `[limits]` too; they take at most half of what first points and features leave")
+        .usual("false"),
 ];
 
 pub(crate) const OBJECT_SOURCES: &[Key] = &[

@@ -18,6 +18,8 @@ pub struct ObjectsSpec {
     pub per_load_module: u32,
     /// The same in every window of load modules, which is that of the job's limits.
     pub per_4km_square: u32,
+    /// Whether they count in the job's limits, together with the ground.
+    pub joint: bool,
 }
 
 /// A file of objects.

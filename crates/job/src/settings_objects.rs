@@ -18,6 +18,9 @@ pub(crate) fn describe(objects: &ObjectsSpec, list: &mut List) {
     list.add("objects.area_min_m2", number(objects.options.area_min_m2));
     list.add("objects.limits.per_load_module", objects.per_load_module.to_string());
     list.add("objects.limits.per_4km_square", objects.per_4km_square.to_string());
+    if objects.joint {
+        list.add_with("objects.limits.joint", "true".to_owned(), "they count in [limits], too".to_owned());
+    }
 }
 
 fn source_text(source: &ObjectSource) -> String {

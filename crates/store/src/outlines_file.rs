@@ -5,9 +5,10 @@ use std::path::Path;
 
 use load_module_reader::{ObjectKind, Objects};
 use serde::{Deserialize, Serialize};
+use terrain::{ModuleGrid, ModuleId};
 
 use crate::frame::{Kind, malformed};
-use crate::{DatabaseError, FeatureRemark, ObjectSums, Stamp, codec, frame};
+use crate::{DatabaseError, FeatureRemark, ObjectSums, ReportPlace, Stamp, codec, frame};
 
 /// What stands on the ground of an area. Heights of prisms are above the highest ground under each.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -48,10 +49,8 @@ pub struct ObjectLeftOut {
     pub height_m: f64,
     /// What is seen of it from the side, in square metres.
     pub silhouette_m2: f64,
-    /// Whether a window was full; else a load module.
-    pub is_window: bool,
-    /// Row and column of the load module, or of the first of the window.
-    pub full: [i32; 2],
+    /// What was full.
+    pub full: ReportPlace,
 }
 
 /// The same as it lies on disk: objects as in a file of load modules.
@@ -70,6 +69,15 @@ impl AreaOutlines {
     pub fn of_module(&self, row: u32, col: u32) -> Option<&Objects> {
         let found = self.modules.binary_search_by_key(&(row, col), |module| (module.row, module.col));
         found.ok().map(|index| &self.modules[index].objects)
+    }
+
+    /// Polygons of what stands on each load module of the area, row by row.
+    pub fn counts(&self, grid: ModuleGrid) -> Vec<u32> {
+        let mut counts = vec![0; grid.count()];
+        for &ModuleOutlines { row, col, ref objects } in &self.modules {
+            counts[grid.index(ModuleId { row, col })] = objects.polygons() as u32;
+        }
+        counts
     }
 
     /// The sums of a kind.
@@ -129,8 +137,7 @@ mod tests {
                 at_m: [1.0, 2.0],
                 height_m: 6.0,
                 silhouette_m2: 30.25,
-                is_window: true,
-                full: [1, 0],
+                full: ReportPlace::Window([1, 0]),
             }],
             remarks: Vec::new(),
             notes: vec!["a note".into()],

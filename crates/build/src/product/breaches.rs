@@ -1,7 +1,7 @@
 //! What a report lists as files for maps and for tables: breaches, and what became of features.
 
 use job::Job;
-use store::{AreaOutlines, FeatureRemark, ObjectLeftOut, Report, files};
+use store::{AreaOutlines, FeatureRemark, ObjectLeftOut, Report, ReportPlace, files};
 use views::{BreachPlaces, breaches_csv, breaches_geojson, features_geojson};
 
 /// Names and texts of the files that list the breaches of `report`, whose job this is.
@@ -25,14 +25,16 @@ pub fn features_file(job: &Job, remarks: &[FeatureRemark]) -> (&'static str, Str
 /// Name and text of the file that lists which objects of this job had no room, and what was mended.
 pub fn objects_file(job: &Job, outlines: &AreaOutlines) -> (&'static str, String) {
     let left_out = |object: &ObjectLeftOut| {
-        let ObjectLeftOut { kind, at_m, height_m, silhouette_m2, is_window, full: [row, col] } = object;
-        let place = if *is_window { "the square of 4 km from" } else { "" };
+        let ObjectLeftOut { kind, at_m, height_m, silhouette_m2, full } = object;
+        let place = match full {
+            ReportPlace::Module([row, col]) => format!("load module {row},{col}"),
+            ReportPlace::Window([row, col]) => format!("the square of 4 km from load module {row},{col}"),
+            ReportPlace::Area => "the area".to_owned(),
+        };
         FeatureRemark {
             feature: format!("{kind}, {height_m:.1} m high"),
             at_m: Some(*at_m),
-            found: format!("{place} load module {row},{col} is full of what hides more than {silhouette_m2:.1} m2")
-                .trim_start()
-                .to_owned(),
+            found: format!("{place} is full of what hides more than {silhouette_m2:.1} m2"),
             done: "left out".to_owned(),
             leaves_out: true,
             degrades: false,

@@ -132,7 +132,7 @@ impl Product {
     /// When only a part was read.
     pub fn limit_use(&self) -> LimitUse {
         assert_eq!(self.part, self.grid.all(), "windows are counted over the whole area");
-        let modules: Vec<u32> = self.modules.iter().map(|module| self.job.limits.count.of(module)).collect();
+        let modules: Vec<u32> = self.modules.iter().map(|module| self.job.counted(module)).collect();
         let window = self.job.limits.window;
         let windows = terrain::limits::Windows::of_size(self.grid, window.rows, window.cols);
         LimitUse { windows: windows.sums(self.grid, &modules), modules, window: [windows.rows, windows.cols] }

@@ -9,18 +9,27 @@ use super::cut::{Piece, border, canopy_lists, cut, walled};
 use super::mend::Outline;
 use super::plan::{METRE, Plan};
 
-/// What may stand in a load module and in a window, in polygons: a roof and each wall are one, and each triangle of a
-/// canopy.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// What may stand where, in polygons: a roof and each wall are one, and each triangle of a canopy.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ObjectLimits {
-    /// Of a load module.
-    pub per_module: u32,
-    /// Of a window.
-    pub per_window: u32,
+    /// Of each load module, row by row.
+    pub modules: Vec<u32>,
+    /// Of each window, by the load module in which it begins, row by row.
+    pub windows: Vec<u32>,
+    /// Of the area.
+    pub area: u64,
     /// Rows and columns of load modules in the area.
     pub size: [i32; 2],
     /// Rows and columns of load modules in a window.
     pub window: [i32; 2],
+}
+
+impl ObjectLimits {
+    /// The same of every load module and of every window, and none of the area.
+    pub fn even([per_module, per_window]: [u32; 2], size: [i32; 2], window: [i32; 2]) -> Self {
+        let count = (size[0] * size[1]) as usize;
+        Self { modules: vec![per_module; count], windows: vec![per_window; count], area: u64::MAX, size, window }
+    }
 }
 
 /// What of one kind is there.
@@ -43,7 +52,7 @@ pub struct Wanting {
     pub height_m: f64,
     /// Its silhouette, square metres.
     pub silhouette_m2: f64,
-    /// What was full: the load module by row and column, or a window by its first ones.
+    /// What was full, by row and column: a load module, or a window by its first one.
     pub full: Full,
 }
 
@@ -54,6 +63,8 @@ pub enum Full {
     Module([i32; 2]),
     /// The window that begins at a load module.
     Window([i32; 2]),
+    /// The area.
+    Area,
 }
 
 /// What stands where.
@@ -268,20 +279,19 @@ fn id_of(outline: &Outline, part: u64) -> u64 {
 struct Room<'a> {
     limits: &'a ObjectLimits,
     modules: Vec<u32>,
-    /// By the load module in which they begin.
     windows: Vec<u32>,
+    area: u64,
     window_size: [i32; 2],
     prisms: Vec<u32>,
 }
 
 impl<'a> Room<'a> {
     fn new(limits: &'a ObjectLimits) -> Self {
-        let [rows, cols] = limits.size;
         // An area smaller than a window is one.
         let window_size = [0, 1].map(|axis| limits.window[axis].min(limits.size[axis]).max(1));
-        let count = (rows * cols) as usize;
-        let windows = vec![limits.per_window; count];
-        Self { limits, modules: vec![limits.per_module; count], windows, window_size, prisms: vec![0; count] }
+        let (modules, windows) = (limits.modules.clone(), limits.windows.clone());
+        let prisms = vec![0; modules.len()];
+        Self { limits, modules, windows, area: limits.area, window_size, prisms }
     }
 
     fn index(&self, [row, col]: [i32; 2]) -> usize {
@@ -318,6 +328,8 @@ impl<'a> Room<'a> {
         if let Some((&window, _)) = full {
             return Err(Full::Window(window));
         }
+        let cost: u64 = costs.iter().map(|&(_, cost)| u64::from(cost)).sum();
+        self.area = self.area.checked_sub(cost).ok_or(Full::Area)?;
         for &(module, cost) in costs {
             let index = self.index(module);
             self.modules[index] -= cost;

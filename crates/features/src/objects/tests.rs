@@ -7,7 +7,10 @@ use super::*;
 
 const SIDE: i32 = 64_000;
 const OPTIONS: ObjectOptions = ObjectOptions { corners_max: 15, area_min_m2: 20.0 };
-const LIMITS: ObjectLimits = ObjectLimits { per_module: 400, per_window: 12_800, size: [2, 2], window: [8, 8] };
+/// Of four load modules, which are one window.
+fn limits(per_module: u32, per_window: u32) -> ObjectLimits {
+    ObjectLimits::even([per_module, per_window], [2, 2], [8, 8])
+}
 
 fn object(name: &str, tags: &[(&str, &'static str)], shape: FoundShape) -> FoundObject {
     let tag = |key: &str| tags.iter().find(|(name, _)| *name == key).map(|(_, value)| *value);
@@ -25,7 +28,7 @@ fn house(at: [f64; 2], side: f64, height: &'static str) -> FoundObject {
 }
 
 fn made(found: Vec<FoundObject>) -> (Granted, Vec<ObjectRemark>) {
-    objects(found, &LIMITS)
+    objects(found, &limits(400, 12_800))
 }
 
 fn objects(found: Vec<FoundObject>, limits: &ObjectLimits) -> (Granted, Vec<ObjectRemark>) {
@@ -65,17 +68,18 @@ fn what_hides_least_goes_first_and_whole() {
     found.push(house([495.0, 300.0], 10.0, "30"));
     found.push(house([30.0, 400.0], 10.0, "5"));
     // 32 houses of 5 polygons, one of them half in the next load module, with a wall less on both sides.
-    let limits = ObjectLimits { per_module: 154, ..LIMITS };
-    let (granted, _) = objects(found, &limits);
+    let (granted, _) = objects(found, &limits(154, 12_800));
     let [kept, wanted] = granted.kinds[&ObjectKind::Building];
     assert_eq!((kept.count, wanted.count), (31, 32));
     assert_eq!(granted.left_out.len(), 1);
     assert_eq!((granted.left_out[0].height_m, granted.left_out[0].full), (5.0, grant::Full::Module([0, 0])));
     assert!(kept.silhouette_m2 < wanted.silhouette_m2);
     assert_eq!(granted.modules[&[0, 0]].polygons(), 154);
-    let limits = ObjectLimits { per_window: 4, ..LIMITS };
-    let (none, _) = objects(vec![house([10.0, 10.0], 10.0, "6")], &limits);
+    let (none, _) = objects(vec![house([10.0, 10.0], 10.0, "6")], &limits(400, 4));
     assert_eq!((none.modules.len(), none.left_out[0].full), (0, grant::Full::Window([0, 0])));
+    let of_area = ObjectLimits { area: 9, ..limits(400, 12_800) };
+    let (one, _) = objects([10.0, 600.0].map(|at| house([at, 10.0], 10.0, "6")).into(), &of_area);
+    assert_eq!((one.modules.len(), one.left_out[0].full), (1, grant::Full::Area));
 }
 
 #[test]
@@ -85,8 +89,7 @@ fn what_has_several_pieces_in_a_load_module_costs_all_of_them_there() {
     let ring = ring.into_iter().cycle().take(9).map(|at: [i32; 2]| at.map(f64::from)).collect();
     let found = object("house", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
     for (per_module, kept) in [(7, 0), (8, 1)] {
-        let limits = ObjectLimits { per_module, ..LIMITS };
-        let (granted, _) = objects(vec![found.clone()], &limits);
+        let (granted, _) = objects(vec![found.clone()], &limits(per_module, 12_800));
         assert_eq!(granted.kinds[&ObjectKind::Building][0].count, kept, "{per_module}");
         assert_eq!(granted.left_out.first().map(|left| left.full), (kept == 0).then_some(grant::Full::Module([0, 1])));
     }
@@ -149,8 +152,7 @@ fn a_wood_of_many_corners_is_cut_smoothed_and_covered_by_triangles() {
         })
         .collect();
     let wood = object("wood", &[("landuse", "forest")], FoundShape::Polygon(vec![ring]));
-    let limits = ObjectLimits { per_module: 2_000, ..LIMITS };
-    let (granted, _) = objects(vec![wood], &limits);
+    let (granted, _) = objects(vec![wood], &limits(2_000, 12_800));
     assert_eq!(granted.modules.len(), 4);
     let area: f64 = granted.modules.values().flat_map(|objects| &objects.canopies).map(area_m2).sum();
     // The integral of half the square of the distance.
@@ -173,7 +175,7 @@ fn woods_leave_roads_and_buildings_free() {
     let quanta = |[x, y]: [f64; 2]| [x, y].map(|metres| (metres * METRE) as i32);
     let road = strips(&[[50.0, 150.0], [250.0, 150.0], [450.0, 200.0]].map(quanta), 8 * 128);
     let area = |free: &[Plan]| {
-        let granted = Claims::of(&outlines, free, LIMITS.size, SIDE).granted(&LIMITS);
+        let granted = Claims::of(&outlines, free, [2, 2], SIDE).granted(&limits(400, 12_800));
         assert!(granted.overlaps.is_empty());
         area_m2(&granted.modules[&[0, 0]].canopies[0])
     };
@@ -184,7 +186,7 @@ fn woods_leave_roads_and_buildings_free() {
     // As many roads as would cost more than the wood.
     let many: Vec<Plan> =
         (0..40).flat_map(|k| strips(&[[90.0 + 8.0 * f64::from(k), 90.0], [98.0, 410.0]].map(quanta), 128)).collect();
-    let crossed = Claims::of(&outlines, &many, LIMITS.size, SIDE).granted(&LIMITS);
+    let crossed = Claims::of(&outlines, &many, [2, 2], SIDE).granted(&limits(400, 12_800));
     assert_eq!((crossed.overlaps.len(), crossed.modules[&[0, 0]].canopies[0].triangles.len()), (1, 2));
 }
 

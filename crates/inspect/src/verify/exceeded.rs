@@ -34,8 +34,7 @@ impl std::fmt::Display for Exceeded {
 
 /// What the limits count, for each load module of the area, row by row.
 pub(crate) fn counts(job: &Job, area: &GamingArea, modules: &Modules) -> Vec<u32> {
-    let count = |module: &LoadModule| job.limits.count.of(module);
-    area.grid.all().iter().map(|module| modules.get(&module).map_or(0, count)).collect()
+    area.grid.all().iter().map(|module| modules.get(&module).map_or(0, |module| job.counted(module))).collect()
 }
 
 /// Every limit of a count that is exceeded: of load modules when the pool is used up, smallest excess first, of

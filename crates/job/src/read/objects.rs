@@ -39,6 +39,7 @@ pub(super) fn read(
         },
         per_load_module: limit("per_load_module")?,
         per_4km_square: limit("per_4km_square")?,
+        joint: limits.as_ref().map_or(Ok(false), |limits| limits.flag("joint"))?,
     }))
 }
 

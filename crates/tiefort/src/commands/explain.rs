@@ -6,7 +6,7 @@ use build::product::WantedGround;
 use clap::Args;
 use inspect::{ExplainedFeatures, ExplainedObjects, Explanation, explain};
 use serde_json::{Value, json};
-use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy, ObjectLeftOut};
+use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy, ObjectLeftOut, ReportPlace};
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, fold, grouped};
 
@@ -204,10 +204,10 @@ fn objects_text(objects: &ExplainedObjects) -> String {
 
 /// What had no room for an object.
 fn full_text(left: &ObjectLeftOut) -> String {
-    let [row, col] = left.full;
-    match left.is_window {
-        true => format!("the 4 km square from load module {row},{col} has no room"),
-        false => format!("load module {row},{col} has no room"),
+    match left.full {
+        ReportPlace::Module([row, col]) => format!("load module {row},{col} has no room"),
+        ReportPlace::Window([row, col]) => format!("the 4 km square from load module {row},{col} has no room"),
+        ReportPlace::Area => "the area has no room".to_owned(),
     }
 }
 

@@ -125,21 +125,62 @@ fn objects_change_no_ground_and_bytes_do_not_depend_on_who_builds() {
     for (row, col) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         assert_eq!(ground(&with.scene, row, col), ground(&without.scene, row, col));
     }
-    let product = with.scene.product("area.tdb");
+    same_whoever_builds(&with.scene);
+}
+
+/// Many workers, unit by unit, and each tile again alone.
+fn same_whoever_builds(scene: &Scene) {
+    let product = scene.product("area.tdb");
     for workers in [1, 8] {
         let name = format!("again-{workers}");
-        drop(with.scene.build(&name, workers));
-        assert_same(&product, &with.scene.product(&name), &name);
+        drop(scene.build(&name, workers));
+        assert_same(&product, &scene.product(&name), &name);
     }
-    let area = build::ground::GamingArea::new(&with.scene.job).unwrap();
-    for unit in build::ORDER.into_iter().flat_map(|stage| build::units(stage, &with.scene.job, &area)) {
-        crate::shared::perform(&with.scene, &[unit]).unwrap();
+    let area = build::ground::GamingArea::new(&scene.job).unwrap();
+    for unit in build::ORDER.into_iter().flat_map(|stage| build::units(stage, &scene.job, &area)) {
+        crate::shared::perform(scene, &[unit]).unwrap();
     }
-    assert_same(&product, &with.scene.product("area"), "unit by unit");
-    // Each tile again, alone.
+    assert_same(&product, &scene.product("area"), "unit by unit");
     for place in [tile(0, 0), tile(1, 1), tile(0, 1), tile(1, 0)] {
-        with.scene.tile("area", place, false);
-        assert_same(&product, &with.scene.product("area"), &format!("{place} again"));
+        scene.tile("area", place, false);
+        assert_same(&product, &scene.product("area"), &format!("{place} again"));
+    }
+}
+
+#[test]
+fn objects_that_count_jointly_leave_the_ground_what_they_do_not_take() {
+    // By load module, by the square of 4 km (which is the area), and by the mean of the area.
+    for (limits, what_binds) in [
+        ("per_load_module = 60\nmean_per_load_module = 60", 0),
+        ("per_load_module = 200\nper_4km_square = 700\nmean_per_load_module = 60", 1),
+        ("per_load_module = 200\nmean_per_load_module = 50", 2),
+    ] {
+        let mut words = Drawing::words();
+        words.limits = limits.into();
+        let built = |joint: &str| {
+            let words = Words { objects: format!("[objects]\nlimits = {{ joint = {joint} }}"), ..words.clone() };
+            let drawing = Drawing::of(words, hills, &drawn());
+            drawing.built();
+            let report = Folder::new(drawing.scene.path("area.tdb")).report().unwrap();
+            (drawing, report)
+        };
+        let ((joint, report), (_, apart)) = (built("true"), built("false"));
+        let objects = report.objects.unwrap().polygons;
+        assert!(0 < objects && report.breaches.is_empty(), "{limits}: {objects}, {:?}", report.breaches);
+        assert!(report.triangles < apart.triangles, "{limits}: the ground has less");
+        let counted = (report.per_load_module.mean * 16.0).round() as u64;
+        assert_eq!(counted, report.triangles + objects, "{limits}");
+        let area = (16.0 * report.per_load_module.mean_limit) as u64;
+        let full = [
+            (report.per_load_module.max, report.per_load_module.limit),
+            (report.per_4km.max, report.per_4km.limit),
+            (counted, area),
+        ];
+        full.iter().for_each(|(count, limit)| assert!(count <= limit, "{limits}: {full:?}"));
+        let (count, limit) = full[what_binds];
+        assert!(limit - limit / 20 <= count, "{limits}: {full:?}");
+        joint.scene.verify("area.tdb");
+        same_whoever_builds(&joint.scene);
     }
 }
 
