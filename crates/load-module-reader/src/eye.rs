@@ -136,8 +136,9 @@ impl Eye<'_> {
         (-lost).exp()
     }
 
-    /// The line to a place in quanta over a load module that is loaded, with that and the tops of its objects.
-    fn past_objects(&self, row: u32, col: u32, to: [f64; 3]) -> Option<(&TerrainModule, &ObjectTops, Line)> {
+    /// A load module with objects that is loaded, the tops of its ground and of its objects, and the line to a place in
+    /// quanta over it.
+    fn past_objects(&self, row: u32, col: u32, to: [f64; 3]) -> Option<(&TerrainModule, &[i32], &ObjectTops, Line)> {
         let (ground, side) = (self.ground, self.ground.frame().side);
         let index = ground.block().contains(row, col).then(|| ground.block().index(row, col))?;
         let module = &*ground.modules()[index];
@@ -147,19 +148,19 @@ impl Eye<'_> {
         let of_ground = self.tops[index].1.get_or_init(|| tops_of(module.lookup()));
         let tops = self.object_tops[index].get_or_init(|| ObjectTops::of(module, side, of_ground));
         let corner = [col, row].map(|index| f64::from(index) * f64::from(side));
-        Some((module, tops, Line::in_module(corner, self.from, to, self.curvature)))
+        Some((module, of_ground, tops, Line::in_module(corner, self.from, to, self.curvature)))
     }
 
     fn is_behind_prisms(&self, row: u32, col: u32, to: [f64; 3]) -> bool {
         let side = self.ground.frame().side;
-        let Some((module, tops, line)) = self.past_objects(row, col, to) else { return false };
+        let Some((module, _, tops, line)) = self.past_objects(row, col, to) else { return false };
         let Some(lookup) = &module.objects().prisms else { return false };
         if is_above(&line, [0.0; 2], [f64::from(side); 2], tops.prisms.highest) {
             return false;
         }
         let prisms = &module.module().objects.prisms;
         let (mut is_hidden, mut last) = (false, usize::MAX);
-        let wanted = |row, col| may_rise(lookup, side, &tops.prisms.cells, &line, [row, col]);
+        let wanted = |row, col| may_rise(lookup, side, (&tops.prisms.cells, 0), &line, [row, col]);
         lookup.triangles_along_in(side, line.start, line.end, wanted, |corners| {
             let number = corners[0][2] as usize;
             if !is_hidden && number != std::mem::replace(&mut last, number) {
@@ -174,14 +175,16 @@ impl Eye<'_> {
         let mut stretches = std::mem::take(&mut self.stretches);
         stretches.clear();
         let side = self.ground.frame().side;
-        if let Some((module, tops, line)) = self.past_objects(row, col, to) {
+        if let Some((module, ground, tops, line)) = self.past_objects(row, col, to) {
+            // Where the line stays above all crowns over a cell of the ground, it is in no wood there.
+            let wanted = |height, row, col| may_rise(module.lookup(), side, (ground, height), &line, [row, col]);
             for (lookup, tops) in module.objects().canopies.iter().zip(&tops.canopies) {
                 if is_above(&line, [0.0; 2], [f64::from(side); 2], tops.highest) {
                     continue;
                 }
-                let wanted = |row, col| may_rise(lookup, side, &tops.cells, &line, [row, col]);
-                lookup.triangles_along_in(side, line.start, line.end, wanted, |corners| {
-                    below_top(module, side, &line, &corners, &mut stretches);
+                let crowns = |row, col| may_rise(lookup, side, (&tops.cells, 0), &line, [row, col]);
+                lookup.triangles_along_in(side, line.start, line.end, crowns, |corners| {
+                    below_top(module, side, &line, &corners, wanted, &mut stretches);
                 });
             }
         }
@@ -212,7 +215,7 @@ impl Eye<'_> {
         }
         let lookup = module.lookup();
         let tops = tops.get_or_init(|| tops_of(lookup));
-        hidden_in(lookup, side, &line, |row, col| may_rise(lookup, side, tops, &line, [row, col])).is_finite()
+        hidden_in(lookup, side, &line, |row, col| may_rise(lookup, side, (tops, 0), &line, [row, col])).is_finite()
     }
 }
 
@@ -228,9 +231,9 @@ fn is_above(line: &Line, low: [f64; 2], high: [f64; 2], top: f64) -> bool {
     shares[0] <= shares[1] && top + MARGIN < line.lowest(shares)
 }
 
-/// Whether the triangles of a cell may rise above a line.
-fn may_rise(lookup: &Lookup, side: u16, tops: &[i32], line: &Line, [row, col]: [u32; 2]) -> bool {
+/// Whether what stands so many quanta high on the triangles of a cell may rise above a line.
+fn may_rise(lookup: &Lookup, side: u16, (tops, up): (&[i32], u16), line: &Line, [row, col]: [u32; 2]) -> bool {
     let ([south, north], [west, east]) = (lookup.lines_of(row, side), lookup.lines_of(col, side));
-    let top = f64::from(tops[(row * lookup.across() + col) as usize]);
+    let top = f64::from(tops[(row * lookup.across() + col) as usize]) + f64::from(up);
     !is_above(line, [west, south], [east, north], top)
 }

@@ -271,17 +271,19 @@ pub(crate) fn holds(prism: &Prism, [x, y]: [f64; 2]) -> bool {
 fn canopies_along(module: &TerrainModule, side: u16, line: &Line, last: f64, stretches: &mut Vec<Stretch>) {
     for lookup in &module.objects().canopies {
         lookup.triangles_along(side, line.start, line.place(last), |corners| {
-            below_top(module, side, line, &corners, stretches);
+            below_top(module, side, line, &corners, |_, _, _| true, stretches);
         });
     }
 }
 
-/// Adds the parts of a line over one triangle of a canopy that lie below its top, ground triangle by ground triangle.
+/// Adds the parts of a line over one triangle of a canopy that lie below its top, ground triangle by ground triangle,
+/// in cells of the ground that are wanted: by the canopy's height in quanta, row and column.
 pub(crate) fn below_top(
     module: &TerrainModule,
     side: u16,
     line: &Line,
     corners: &Corners,
+    wanted: impl Fn(u16, u32, u32) -> bool,
     stretches: &mut Vec<Stretch>,
 ) {
     const DEPTH_M: f64 = 10.0;
@@ -293,7 +295,8 @@ pub(crate) fn below_top(
     let canopy = &module.module().objects.canopies[number as usize];
     let per_metre = -(1.0 - f64::from(canopy.fullness) / 100.0).ln() / DEPTH_M;
     let by = Hider::of(canopy.kind);
-    module.lookup().triangles_along(side, line.place(first), line.place(last), |corners| {
+    let wanted = |row, col| wanted(canopy.height, row, col);
+    module.lookup().triangles_along_in(side, line.place(first), line.place(last), wanted, |corners| {
         let Some([from, to]) = part_over(&corners, line) else { return };
         // How far the line is above the top; along so short a way the earth's curvature is nothing.
         let above = |[at, ground]: [f64; 2]| line.height(at) - ground - f64::from(canopy.height);

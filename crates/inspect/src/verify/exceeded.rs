@@ -3,7 +3,7 @@
 use job::{Edges, Job};
 use serde_json::Value;
 use store::{Folder, Manifest, Report, ReportBreach, ReportPlace, TileState, files};
-use terrain::{LoadModule, ModuleId};
+use terrain::ModuleId;
 
 use super::entries::state_word;
 use super::modules::Modules;
