@@ -110,7 +110,7 @@ class Attack:
         own_borders = sections.get("lod", {}).get("border") == '"own"'
         found["crack"] += judge.watertight(database, own_borders)
         # A breach is told by exit code 1.
-        over = judge.limits(database, self.scene.job.limits if "limits" in sections else {})
+        over = judge.limits(database, self.scene.job.limits if "limits" in sections else {}, is_joint(sections))
         if over and code == 0:
             found["limits"] += over
         if self.is_bare(sections):
@@ -183,7 +183,8 @@ class Attack:
         """The report's figures are those of the triangles."""
         database = judge.Database.read(self.folder / "area")
         report = json.loads((self.folder / "area/report.json").read_text())
-        counted = judge.counts(database, self.scene.job.limits.get("count") == "polygons")
+        job = self.scene.job
+        counted = judge.counts(database, job.limits.get("count") == "polygons", is_joint(job.sections))
         in_level = [sum(map(judge.triangle_count, level.values())) for level in database.levels]
         limit = self.scene.job.limits["per_load_module"]
         wanted = {
@@ -337,6 +338,11 @@ class Attack:
             return None
         forgery.set_triangles(number, found)
         return "an edge was turned"
+
+
+def is_joint(sections):
+    """Whether objects count in the limits of the ground."""
+    return "joint = true" in sections.get("objects", {}).get("limits", "")
 
 
 def away(x, y, ax, ay, bx, by):

@@ -625,7 +625,8 @@ class Job:
         own = {"sources": f"[{', '.join(sources)}]"}
         if draw.random() < 0.5:
             self.object_limits = draw.choice([(40, 500), (400, 3000), (100000, 3200000)])
-            own["limits"] = "{{ per_load_module = {}, per_4km_square = {} }}".format(*self.object_limits)
+            keys = "per_load_module = {}, per_4km_square = {}".format(*self.object_limits)
+            own["limits"] = f"{{ {keys}, joint = {draw.choice(['true', 'false'])} }}"
         if draw.random() < 0.3:
             own["corners_max"] = draw.choice(["4", "8", "40"])
         if draw.random() < 0.3:

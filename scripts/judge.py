@@ -254,13 +254,18 @@ def deck_ends(module, across, line):
     return set(zip(along[there].tolist(), module.decks.z[there].tolist()))
 
 
-def counts(database, polygons=False):
+def counts(database, polygons=False, joint=False):
     """What counts against limits in each load module at the finest level, decks included: rows x columns."""
     counted = np.zeros((database.rows, database.columns), dtype=np.int64)
     for place, module in database.levels[0].items():
         fanned = len(module.ground.triangles) - module.polygons if polygons else 0
-        counted[place] = triangle_count(module) - fanned
+        counted[place] = triangle_count(module) - fanned + (sum(map(object_polygons, module.objects)) if joint else 0)
     return counted
+
+
+def object_polygons(one):
+    """Triangles of a wood; the roof and the walls of what has any."""
+    return 1 + sum(corner[2] for ring in one["rings"] for corner in ring) if "rings" in one else len(one["triangles"])
 
 
 def windows(counted, side_m):
@@ -272,9 +277,9 @@ def windows(counted, side_m):
     return int((sums[high:, wide:] - sums[:-high, wide:] - sums[high:, :-wide] + sums[:-high, :-wide]).max())
 
 
-def limits(database, limits):
+def limits(database, limits, joint=False):
     """Faults against a table of limits with the keys of a job; what its defaults say holds where it has none."""
-    counted = counts(database, limits.get("count") == "polygons")
+    counted = counts(database, limits.get("count") == "polygons", joint)
     module, pool = limits.get("per_load_module", 100), limits.get("pool", 0)
     mean, window = limits.get("mean_per_load_module", 32), limits.get("per_4km_square", 4096)
     faults = []
@@ -733,10 +738,9 @@ def standing(database, per_module, per_window):
             faults.append(f"load module {place}: levels have other objects")
         corner = np.array([place[1], place[0]]) * database.side
         for one in module.objects:
+            counts[place] += object_polygons(one)
             if "rings" not in one:
-                counts[place] += len(one["triangles"])
                 continue
-            counts[place] += 1 + sum(corner[2] for ring in one["rings"] for corner in ring)
             at = along_walls(one["rings"]) + corner
             grounds = [heights_at(level[place].ground, *at.T) for level in database.levels]
             low = min(np.nanmin(ground) for ground in grounds)
