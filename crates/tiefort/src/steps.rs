@@ -1,4 +1,4 @@
-//! How far an export is: a bar on a terminal, at most a line a second elsewhere.
+//! How far an export, or another command that counts, is: a bar on a terminal, at most a line a second elsewhere.
 
 use std::sync::Mutex;
 use std::time::Instant;

@@ -30,7 +30,7 @@ use schedule::Workers;
 
 use found::larger_spacing_m;
 use heights::Place;
-use places::Common;
+use places::{Common, Tell};
 use surface::{Ground, Surface};
 
 /// Metres above the ground of both ends of lines of sight.
@@ -40,7 +40,8 @@ pub const NEAREST_M: f64 = 50.0;
 /// Number of the first draw of a pair, so that none is drawn with the numbers of a place.
 const FIRST_PAIR: u64 = 1 << 40;
 
-/// Compares the terrain database in the folder `first` with the one in `second`, or with a raster of heights.
+/// Compares the terrain database in the folder `first` with the one in `second`, or with a raster of heights. `tell` is
+/// told what is looked at, how many of it are done, and of how many, from any thread.
 ///
 /// # Errors
 /// When one cannot be read, they have not one coordinate system, datum and area, or no sample is large enough.
@@ -48,7 +49,7 @@ pub fn correlate(
     first: &Path,
     second: &Path,
     request: &CorrelateRequest,
-    (workers, stop): (usize, &AtomicBool),
+    (workers, stop, tell): (usize, &AtomicBool, &Tell<'_>),
 ) -> Result<Correlation, CompileError> {
     let plan = plan_of(request)?;
     if !first.is_dir() {
@@ -67,7 +68,7 @@ pub fn correlate(
     }
     let apart_m = larger_spacing_m(&surfaces);
     let (workers, reach_m) = (Workers::new(workers), request.range_m.max(18.0 * apart_m));
-    let mut common = Common::new((&a, &b), common_m, reach_m, (&workers, stop))?;
+    let mut common = Common::new((&a, &b), common_m, reach_m, (&workers, stop, tell))?;
     let places = draw_places(&mut common, plan.samples, request.seed, apart_m)?;
     let pairs = draw_pairs(&mut common, plan.samples, request, standing)?;
 
@@ -182,7 +183,7 @@ fn draw_places(
         let class = a.class(*at);
         heights_m.iter().any(Option::is_some).then_some(Place { heights_m, class, gradients })
     };
-    common.drawn(wanted, draw, |at| *at, look)
+    common.drawn("places", wanted, draw, |at| *at, look)
 }
 
 /// Whether A and B show the far end, at each height above the ground.
@@ -206,7 +207,7 @@ fn draw_pairs(
         }
         Some(sights)
     };
-    common.drawn(wanted, draw, |pair| pair[0], look)
+    common.drawn("lines of sight", wanted, draw, |pair| pair[0], look)
 }
 
 fn tally_sights(pairs: impl Iterator<Item = Sights>) -> Vec<SightFigures> {

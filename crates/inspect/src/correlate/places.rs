@@ -1,7 +1,7 @@
 //! Places and pairs of places drawn over what two surfaces have in common, and both grounds under them.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use build::CompileError;
 use build::ground::GroundError;
@@ -16,6 +16,9 @@ const PLACES_AT_ONCE: usize = 256;
 /// Draws for each place that is wanted, where many lie in holes.
 const DRAWS_EACH: u64 = 20;
 
+/// Told what is looked at, how many of it are done, and of how many, from any thread.
+pub(super) type Tell<'a> = dyn Fn(&'static str, usize, usize) + Sync + 'a;
+
 /// Two surfaces over the rectangle that both reach, by squares of which the ground fits into memory.
 pub(super) struct Common<'a> {
     pub a: &'a Surface,
@@ -26,6 +29,7 @@ pub(super) struct Common<'a> {
     pub reach_m: f64,
     pub workers: &'a Workers,
     pub stop: &'a AtomicBool,
+    tell: &'a Tell<'a>,
     square_m: f64,
     held: Option<([u32; 2], [Ground; 2])>,
 }
@@ -47,7 +51,7 @@ impl<'a> Common<'a> {
         (a, b): (&'a Surface, &'a Surface),
         rect_m: [f64; 4],
         reach_m: f64,
-        (workers, stop): (&'a Workers, &'a AtomicBool),
+        (workers, stop, tell): (&'a Workers, &'a AtomicBool, &'a Tell<'a>),
     ) -> Result<Self, CompileError> {
         let [wide, high] = [rect_m[2] - rect_m[0], rect_m[3] - rect_m[1]];
         let bytes = |side_m: f64| {
@@ -64,7 +68,7 @@ impl<'a> Common<'a> {
             let expected = format!("{:.0} MB at most", 8.0 * GROUND_BYTES_MAX / 1e6);
             return Err(GroundError::Impossible { key, found, expected, hint: "ask for a smaller range".into() }.into());
         }
-        Ok(Self { a, b, rect_m, reach_m, workers, stop, square_m, held: None })
+        Ok(Self { a, b, rect_m, reach_m, workers, stop, tell, square_m, held: None })
     }
 
     /// Extent east and north, in metres.
@@ -72,12 +76,14 @@ impl<'a> Common<'a> {
         [self.rect_m[2] - self.rect_m[0], self.rect_m[3] - self.rect_m[1]]
     }
 
-    /// What `work` finds on both grounds for each item, in the order of items; `at` is where an item lies.
+    /// What `work` finds on both grounds for each item, in the order of items; `what` they are is told, `at` is where
+    /// an item lies.
     ///
     /// # Errors
     /// When ground cannot be read, or it was asked to stop.
     pub fn each<T: Sync, R: Send>(
         &mut self,
+        what: &'static str,
         items: &[T],
         at: impl Fn(&T) -> [f64; 2],
         work: impl Fn(&Ground, &Ground, &T) -> R + Sync,
@@ -89,12 +95,15 @@ impl<'a> Common<'a> {
             squares.entry(square).or_default().push(index);
         }
         let mut found: Vec<Option<R>> = items.iter().map(|_| None).collect();
+        let done = AtomicUsize::new(0);
         for (square, indices) in squares {
-            let (workers, stop) = (self.workers, self.stop);
+            let (workers, stop, tell) = (self.workers, self.stop, self.tell);
             let [a, b] = self.ground(square)?;
             let parts: Vec<&[usize]> = indices.chunks(PLACES_AT_ONCE).collect();
             let ask = |_: usize, part: &&[usize]| -> Result<Vec<R>, CompileError> {
-                Ok(part.iter().map(|&index| work(a, b, &items[index])).collect())
+                let results = part.iter().map(|&index| work(a, b, &items[index])).collect();
+                tell(what, done.fetch_add(part.len(), Ordering::Relaxed) + part.len(), items.len());
+                Ok(results)
             };
             let results = schedule::for_each_independent(&parts, workers, stop, ask).map_err(ended)?;
             for (&index, result) in indices.iter().zip(results.into_iter().flatten()) {
@@ -128,6 +137,7 @@ impl<'a> Common<'a> {
     /// When ground cannot be read, or it was asked to stop.
     pub fn drawn<T: Sync, R: Send>(
         &mut self,
+        what: &'static str,
         wanted: u64,
         draw: impl Fn(u64) -> Option<T>,
         at: impl Fn(&T) -> [f64; 2],
@@ -139,7 +149,7 @@ impl<'a> Common<'a> {
             let count = (wanted - drawn.judged.len() as u64).max(PLACES_AT_ONCE as u64).min(DRAWS_EACH * wanted - next);
             let items: Vec<T> = (next..next + count).filter_map(&draw).collect();
             next += count;
-            let found = self.each(&items, &at, &work)?;
+            let found = self.each(what, &items, &at, &work)?;
             drawn.left_out += count - items.len() as u64;
             for (item, result) in items.into_iter().zip(found) {
                 match result {

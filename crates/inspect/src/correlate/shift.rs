@@ -58,7 +58,7 @@ pub(super) fn best_shift(
             let from = [place[0] - east, place[1] - north];
             Some((a.height_m(*place)? - b.height_m(from)?, b.gradient(from, apart_m)?))
         };
-        common.each(places_m, |place| *place, row)
+        common.each("places shifted", places_m, |place| *place, row)
     };
     let start = rows_at([0.0; 2])?;
     let mut step = solve(&start.iter().copied().flatten().collect::<Vec<_>>());

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
+use exports::Step;
 use inspect::{CorrelateRequest, Correlation, Demand, SAMPLES_MAX};
 use load_module_reader::Standing;
 use views::{certificate_html, certificate_text};
@@ -12,6 +13,7 @@ use views::{certificate_html, certificate_text};
 use crate::arguments::{Format, Workers, positive};
 use crate::certificate::certificate;
 use crate::failure::{Failure, Outcome};
+use crate::steps::Steps;
 use crate::{correlation_json, files, places, terminal};
 
 const AFTER_HELP: &str = "\
@@ -72,6 +74,9 @@ pub struct Arguments {
     format: Format,
     #[command(flatten)]
     workers: Workers,
+    /// Show no progress
+    #[arg(long)]
+    quiet: bool,
 }
 
 /// Farthest target that may be asked for, in metres: the ground as far around is held in memory.
@@ -102,7 +107,8 @@ fn range(text: &str) -> Result<f64, String> {
 
 /// Compares.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let found = found(arguments, &AtomicBool::new(false))?;
+    let steps = Steps::start(arguments.quiet);
+    let found = found(arguments, &AtomicBool::new(false), &steps)?;
     terminal::print(&match arguments.format {
         Format::Text => certificate_text(&certificate(&found)),
         Format::Json => format!("{:#}\n", correlation_json::to_json(&found)),
@@ -115,11 +121,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 /// # Errors
 /// When there is nothing to compare, or the page cannot be written.
 pub fn json_text(arguments: &Arguments, stop: &AtomicBool) -> Result<String, Failure> {
-    Ok(correlation_json::to_json(&found(arguments, stop)?).to_string())
+    Ok(correlation_json::to_json(&found(arguments, stop, &Steps::start(true))?).to_string())
 }
 
 /// What is found, with the page written where one is asked for.
-fn found(arguments: &Arguments, stop: &AtomicBool) -> Result<Correlation, Failure> {
+fn found(arguments: &Arguments, stop: &AtomicBool, steps: &Steps) -> Result<Correlation, Failure> {
     if let Some(path) = &arguments.page {
         files::check_writable(path)?;
     }
@@ -134,7 +140,10 @@ fn found(arguments: &Arguments, stop: &AtomicBool) -> Result<Correlation, Failur
         allow_datums: arguments.allow_datums,
     };
     let (first, second) = (&arguments.first, &arguments.second);
-    let found = inspect::correlate(first, second, &request, (arguments.workers.count(), stop))?;
+    let tell = |what, done, total| steps.tell(Step { what, done, total });
+    let found = inspect::correlate(first, second, &request, (arguments.workers.count(), stop, &tell));
+    steps.finish();
+    let found = found?;
     if let Some(path) = &arguments.page {
         files::write_whole(path, |out| out.write_all(certificate_html(&certificate(&found)).as_bytes()))?;
     }
