@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, MAIN_SEPARATOR, Path, PathBuf};
 
 use crate::bounds::{FEATURE_SOURCES_MAX, SOURCES_MAX, VISITED_MAX};
 use crate::{
@@ -293,10 +293,10 @@ fn matches_below(home: &Path, rest: &Path, most: usize, fault: &Fault) -> Result
     Ok(found)
 }
 
-/// A file that a pattern found, named as the job would name it.
+/// A file that a pattern found, named as the job would name it, on any system with `/` between folders.
 fn matched(path: PathBuf, folder: &Path, home: &Path, fault: &Fault) -> Result<NamedFile, JobError> {
     refuse_outside(&path, home, fault)?;
-    let written = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+    let written = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().replace(MAIN_SEPARATOR, "/");
     Ok(NamedFile { written, path })
 }
 

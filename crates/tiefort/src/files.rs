@@ -31,8 +31,8 @@ pub fn write_whole_or(
 ) -> Result<(), Failure> {
     let fault = |error: io::Error| Failure::output(path, &error);
     let file = temporary_beside(path)?;
-    // Others leave it alone while this process lives.
-    let _held = left_over::hold(file.path());
+    // Others leave it alone while this process lives. Locked as it is open here: Windows lets only that one write.
+    let _ = file.as_file().try_lock();
     let _making = signals::making(file.path());
     let mut out = BufWriter::new(file.as_file());
     write(&mut out)?;

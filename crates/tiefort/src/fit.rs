@@ -38,17 +38,10 @@ pub fn check(forecast: &Forecast, workers: usize, folder: &Path) -> Result<(), F
 }
 
 /// Bytes free on the disk on which `folder` is, or will be.
-#[cfg(target_os = "linux")]
 fn free_disk(folder: &Path) -> Option<u64> {
     let whole = std::path::absolute(folder).ok()?;
     let there = whole.ancestors().find(|folder| folder.exists())?;
-    let found = rustix::fs::statvfs(there).ok()?;
-    Some(found.f_bavail.saturating_mul(found.f_frsize))
-}
-
-#[cfg(not(target_os = "linux"))]
-fn free_disk(_: &Path) -> Option<u64> {
-    None
+    fs4::available_space(there).ok()
 }
 
 #[cfg(test)]

@@ -90,6 +90,8 @@ fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
 /// A path as SQLite takes it in an address: every byte that could mean something else, written as a number.
 fn address(path: &Path) -> String {
     let bytes = path.as_os_str().as_encoded_bytes();
+    // How Windows begins a path that is whole; SQLite knows it without.
+    let bytes = bytes.strip_prefix(br"\\?\").unwrap_or(bytes);
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"/._-".contains(&byte);
     let written =
         bytes.iter().map(|&byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02x}") });

@@ -126,12 +126,14 @@ impl Store for Disk {
 
     #[cfg(not(target_os = "linux"))]
     fn sync(&self, _dir: &Path, files: &[PathBuf], folders: &[PathBuf]) -> Result<()> {
-        files.iter().try_for_each(|path| File::open(path)?.sync_all())?;
+        // Windows writes out only what was opened for writing.
+        files.iter().try_for_each(|path| File::options().write(true).open(path)?.sync_all())?;
         folders.iter().try_for_each(|folder| sync_folder(folder))
     }
 
     fn lock(&self, path: &Path, kind: LockKind) -> Result<Option<Box<dyn Guard>>> {
-        let file = File::options().create(true).append(true).open(path)?;
+        // Windows locks no file that is opened for appending alone.
+        let file = File::options().create(true).read(true).append(true).open(path)?;
         let locked = match kind {
             LockKind::Alone => file.try_lock(),
             LockKind::Shared => file.try_lock_shared(),
@@ -170,7 +172,7 @@ fn entry(found: &Metadata) -> Entry {
 ///
 /// # Errors
 /// What the system says if not.
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
 pub fn check_writable(folder: &Path) -> Result<()> {
     use rustix::fs::Access;
     Ok(rustix::fs::access(folder, Access::WRITE_OK | Access::EXEC_OK)?)
@@ -180,7 +182,7 @@ pub fn check_writable(folder: &Path) -> Result<()> {
 ///
 /// # Errors
 /// None.
-#[cfg(not(target_os = "linux"))]
+#[cfg(not(unix))]
 pub fn check_writable(_: &Path) -> Result<()> {
     Ok(())
 }
