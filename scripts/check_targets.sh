@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# Compiles and links the program, the reader for C and the Python module for Windows and macOS. Debian has Rust's
+# standard library for them as source only, which is compiled, too; Zig is their C compiler and linker. Nothing is
+# installed: all lies in target/targets, 4 GB, and is used again. Where Debian's packages are not to be had, it says so
+# and ends well.
+#
+#     scripts/check_targets.sh                                   both
+#     scripts/check_targets.sh x86_64-pc-windows-gnu             one
+#     TIEFORT=target/release/tiefort scripts/check_targets.sh    and builds an area with tiefort.exe, which has to have
+#                                                                the bytes that this program builds; needs wine64
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+mkdir -p "${CARGO_TARGET_DIR:-target}/targets"
+home=$(realpath "${CARGO_TARGET_DIR:-target}/targets")
+debian=$home/debian tools=$home/tools
+if [[ ! -x $debian/usr/bin/rustc ]]; then
+    # They conflict with other compilers, so they are unpacked, with what they need and this machine has not.
+    mapfile -t packages < <(apt-get install --print-uris --quiet=2 --no-install-recommends rustc-web rust-web-src |
+        sed -n "s/^'[^']*' \([^_]*\)_.*/\1/p")
+    rm -rf "$home/unpacked" "$home/packages" && mkdir "$home/packages"
+    if [[ ${#packages[@]} -eq 0 ]] || ! (cd "$home/packages" && apt-get download --quiet=2 "${packages[@]}"); then
+        printf 'left out: rustc-web and rust-web-src are not among the packages of this machine\n' >&2
+        exit 0
+    fi
+    for package in "$home"/packages/*.deb; do dpkg -x "$package" "$home/unpacked"; done
+    rm -r "$home/packages"
+    mv "$home/unpacked" "$debian"
+fi
+if [[ ! -x $tools/bin/cargo-zigbuild ]]; then
+    python3 -m venv "$tools"
+    "$tools/bin/pip" install --quiet --disable-pip-version-check ziglang==0.17.1 cargo-zigbuild==0.24.1
+fi
+
+# The compiler is older or newer than this machine's, so it has folders of its own; nothing is run fast or debugged.
+export LD_LIBRARY_PATH=$debian/usr/lib/x86_64-linux-gnu RUSTC=$debian/usr/bin/rustc RUSTC_BOOTSTRAP=1
+export CARGO_TARGET_DIR=$home CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=none CARGO_PROFILE_DEV_OPT_LEVEL=0
+CARGO_ZIGBUILD_ZIG_PATH=$(echo "$tools"/lib/python3*/site-packages/ziglang/zig)
+export CARGO_ZIGBUILD_ZIG_PATH CARGO_ZIGBUILD_CACHE_DIR=$home/zig
+export ZIG_GLOBAL_CACHE_DIR=$home/zig ZIG_LOCAL_CACHE_DIR=$home/zig
+
+# One command of cargo for a target.
+zig() {
+    "$tools/bin/cargo-zigbuild" "$1" --quiet --locked -Zbuild-std=std,panic_abort,panic_unwind --target "${@:2}"
+}
+[[ $# -gt 0 ]] || set -- x86_64-pc-windows-gnu aarch64-apple-darwin
+for target; do
+    start=$SECONDS link=()
+    zig zigbuild "$target" -p load-module-reader-c -p tiefort
+    # Python's own names are found when it loads the module; macOS has to be told.
+    [[ $target != *apple* ]] || link=(-C link-arg=-undefined -C link-arg=dynamic_lookup)
+    zig rustc "$target" -p tiefort-python -- "${link[@]}"
+    printf '%s: compiled and linked in %d s\n' "$target" $((SECONDS - start))
+done
+
+program=$home/x86_64-pc-windows-gnu/debug/tiefort.exe
+wine=$(command -v wine64 || command -v /usr/lib/wine/wine64 || true)
+if [[ -z ${TIEFORT:-} || -z $wine || ! -f $program ]]; then
+    printf 'nothing was run: that needs TIEFORT, wine64 and a tiefort.exe\n'
+    exit 0
+fi
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+export WINEPREFIX=$home/wine WINEDEBUG=-all
+start=$SECONDS
+"$TIEFORT" build tests/jobs/small.toml --out "$scratch/here.tdb" --quiet
+"$wine" "$program" build tests/jobs/small.toml --out "$scratch/windows.tdb" --quiet
+"$wine" "$program" verify "$scratch/windows.tdb"
+for part in tiles modules database.json; do diff -r "$scratch/here.tdb/$part" "$scratch/windows.tdb/$part"; done
+printf 'tiefort.exe builds the same bytes under wine, in %d s\n' $((SECONDS - start))
