@@ -446,7 +446,7 @@ fn clients_that_do_not_read_make_place_for_others() {
     };
     let clients: Vec<TcpStream> = (0..50).map(|_| ask()).collect();
     let start = Instant::now();
-    // While all places have an answer in the making, others are told to come again; a machine that is busy takes longer.
+    // While all places have an answer in the making, others are told to come again; a busy machine takes longer.
     loop {
         let answer = server.get("/databases.json");
         if answer.status == 200 {
