@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
 """Exports a terrain database in every format and opens each with a reader that is not ours.
 
-    python3 scripts/check_exports.py [DIR...] [--holes] [--bridge] [--tiefort PROGRAM] [--node-modules DIR]
+    python3 scripts/check_exports.py [DIR...] [--holes] [--bridge] [--together] [--tiefort PROGRAM]
+                                     [--node-modules DIR]
 
-With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley. PROGRAM is
-target/release/tiefort unless said. Needs rasterio, rio-cogeo, meshio, geopandas, trimesh, rtree, pyogrio, pyproj,
-quantized-mesh-tile, pmtiles, pillow and numpy; osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's
-python3-qgis); usd-core and mujoco; Debian's libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads
-from `tiefort serve`, with
+With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley, with
+--together three that become one tileset (trimesh and embreex). PROGRAM is target/release/tiefort unless said. Needs
+rasterio, rio-cogeo, meshio, geopandas, trimesh, rtree, pyogrio, pyproj, quantized-mesh-tile, pmtiles, pillow and numpy;
+osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco;
+Debian's libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads from `tiefort serve`, with
 
-    npm install --prefix DIR 3d-tiles-tools@0.5.4 cesium@1.140.0 gltf-validator@2.0.0-dev.3.10 puppeteer-core@24.43.1
+    npm install --prefix DIR 3d-tiles-tools@0.5.4 cesium@1.145.0 gltf-validator@2.0.0-dev.3.10 puppeteer-core@24.43.1
 
 A reader that is missing is told and skipped, unless --all is given.
 """
@@ -36,7 +37,7 @@ import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import read_slm  # noqa: E402
-from exports import engines, objects  # noqa: E402
+from exports import engines, objects, together  # noqa: E402
 
 HERE = pathlib.Path(__file__).parent
 HOLE = 255
@@ -97,6 +98,7 @@ def main():
     parser.add_argument("databases", nargs="*", metavar="DIR")
     parser.add_argument("--holes", action="store_true", help="also build a database with holes and check it")
     parser.add_argument("--bridge", action="store_true", help="also build a database with a bridge and check it")
+    parser.add_argument("--together", action="store_true", help="also build three databases and check their tileset")
     parser.add_argument("--tiefort", default="target/release/tiefort")
     parser.add_argument("--node-modules", help="folder that holds node_modules with gltf-validator")
     parser.add_argument("--qgis-python", help="a Python that has QGIS, to open the GeoPackage with it")
@@ -110,8 +112,11 @@ def main():
         scratch = pathlib.Path(scratch)
         folders = [*arguments.databases, *([with_holes(arguments, scratch)] if arguments.holes else [])]
         folders += [with_bridge(arguments, scratch)] if arguments.bridge else []
-        if not folders:
-            parser.error("name a database, or give --holes or --bridge")
+        if not folders and not arguments.together:
+            parser.error("name a database, or give --holes, --bridge or --together")
+        if arguments.together:
+            (scratch / "several").mkdir()
+            together.check(arguments, scratch / "several", TOOLS, glb_corners)
         for number, folder in enumerate(folders):
             (scratch / str(number)).mkdir()
             check(Database(folder), arguments, scratch / str(number))
@@ -398,6 +403,19 @@ def glb_positions(data):
         accessor = document["accessors"][mesh["primitives"][0]["attributes"]["POSITION"]]
         start = document["bufferViews"][accessor["bufferView"]]["byteOffset"] + accessor["byteOffset"]
         yield numpy.frombuffer(binary, "<f4", 3 * accessor["count"], start).reshape(-1, 3).astype(float)
+
+
+def glb_corners(data):
+    """The corners of all triangles, one after the other."""
+    document, binary = read_glb(data)
+    corners = []
+    for mesh, places in zip(document["meshes"], glb_positions(data)):
+        for primitive in mesh["primitives"]:
+            accessor = document["accessors"][primitive["indices"]]
+            start = document["bufferViews"][accessor["bufferView"]]["byteOffset"] + accessor["byteOffset"]
+            kind = {5121: "u1", 5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
+            corners.append(places[numpy.frombuffer(binary, kind, accessor["count"], start)])
+    return numpy.concatenate(corners)
 
 
 def check_geotiff(database, arguments, scratch):
@@ -943,8 +961,9 @@ def check_cesium(database, arguments, scratch):
     """The exports in CesiumJS."""
     cesium_places(database, arguments, scratch)
     terrain = export(arguments, "quantized-mesh", scratch / "level_terrain", "--assume-datum", "ellipsoid")
+    implicit = export(arguments, "3dtiles-terrain", scratch / "level_implicit", "--assume-datum", "ellipsoid")
     tileset = export(arguments, "3dtiles", scratch / "level_3dtiles", "--assume-datum", "ellipsoid")
-    run_cesium(arguments, scratch, terrain, tileset)
+    run_cesium(arguments, scratch, terrain, tileset, "--implicit", str(implicit))
 
 
 def check_serve(database, arguments, scratch):
@@ -960,8 +979,8 @@ def check_serve(database, arguments, scratch):
             service.terminate()
 
 
-def run_cesium(arguments, scratch, terrain, tileset):
-    command = ["node", str(readers(arguments)), "--terrain", str(terrain), "--tileset", str(tileset)]
+def run_cesium(arguments, scratch, terrain, tileset, *more):
+    command = ["node", str(readers(arguments)), "--terrain", str(terrain), "--tileset", str(tileset), *more]
     command += ["--places", str(scratch / "places.json")]
     command += ["--pictures", arguments.pictures] if arguments.pictures else []
     ran = subprocess.run(command, capture_output=True, text=True)
@@ -983,7 +1002,8 @@ CHECKS = [
     ("quantized-mesh", check_quantized_mesh),
     ("cesium", check_cesium),
     ("serve", check_serve),
-    *[(name, functools.partial(check, tools=TOOLS)) for name, check in engines.CHECKS + objects.CHECKS],
+    *[(name, functools.partial(check, tools=TOOLS)) for name, check in
+      engines.CHECKS + objects.CHECKS],
 ]
 
 if __name__ == "__main__":

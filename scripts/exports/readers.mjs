@@ -1,7 +1,8 @@
 // Readers of exports that are not ours. Run it where `npm install` has put what check_exports.py names.
 //
 //   node readers.mjs gltf FILE.glb…
-//   node readers.mjs --terrain DIR --tileset DIR --places places.json [--pictures DIR] [--chromium /usr/bin/chromium]
+//   node readers.mjs --terrain DIR --implicit DIR --tileset DIR --places places.json [--pictures DIR]
+//                    [--chromium /usr/bin/chromium]
 //   node readers.mjs --terrain http://…/NAME --tileset http://…/NAME --places places.json
 //
 // The first form validates glTF by Khronos' validator: no error and no warning may be found. The others load what is
@@ -38,6 +39,7 @@ const { default: puppeteer } = await import("puppeteer-core");
 const { values } = parseArgs({
   options: {
     terrain: { type: "string" },
+    implicit: { type: "string" },
     tileset: { type: "string" },
     places: { type: "string" },
     pictures: { type: "string" },
@@ -46,7 +48,7 @@ const { values } = parseArgs({
   },
 });
 const cesium = join(dirname(createRequire(import.meta.url).resolve("cesium/package.json")), "Build", "Cesium");
-const roots = { cesium, terrain: values.terrain, tileset: values.tileset };
+const roots = { cesium, terrain: values.terrain, implicit: values.implicit, tileset: values.tileset };
 // Folders are handed out by the server below; a service hands out its own.
 const address = (name) => (values[name]?.startsWith("http:") ? values[name] : `/${name}`);
 const types = {
@@ -102,20 +104,23 @@ try {
   await page.goto(`http://127.0.0.1:${server.address().port}/`, { timeout: 120_000 });
   await page.waitForFunction("window.Cesium !== undefined", { timeout: 300_000 });
   const places = JSON.parse(readFileSync(values.places));
-  if (values.terrain) {
-    const heights = await page.evaluate(async (places, address) => {
-      const wanted = { requestVertexNormals: true, requestWaterMask: true };
-      const terrain = await Cesium.CesiumTerrainProvider.fromUrl(address, wanted);
+  for (const [name, format] of [["terrain", "quantized-mesh"], ["implicit", "3dtiles-terrain"]]) {
+    if (!values[name]) continue;
+    const heights = await page.evaluate(async (places, address, isImplicit) => {
+      const wanted = { requestVertexNormals: true, requestWaterMask: !isImplicit };
+      const terrain = isImplicit
+        ? await Cesium.Cesium3DTilesTerrainProvider.fromUrl(`${address}/tileset.json`, wanted)
+        : await Cesium.CesiumTerrainProvider.fromUrl(address, wanted);
       const asked = places.map(([lon, lat]) => Cesium.Cartographic.fromDegrees(lon, lat));
       await Cesium.sampleTerrainMostDetailed(terrain, asked);
       window.terrain = terrain;
       return asked.map((place) => place.height);
-    }, places, address("terrain"));
+    }, places, address(name), name === "implicit");
     const off = heights.map((height, index) => Math.abs(height - places[index][2]));
     const worst = Math.max(...off.map((metres) => (Number.isFinite(metres) ? metres : Infinity)));
     expect(worst < Number(values.tolerance),
-      `quantized-mesh: ${heights.length} heights by sampleTerrainMostDetailed within ${worst.toFixed(3)} m`);
-    await look(page, "terrain", places, false);
+      `${format}: ${heights.length} heights by sampleTerrainMostDetailed within ${worst.toFixed(3)} m`);
+    await look(page, name, places, false);
   }
   if (values.tileset) {
     const loaded = await look(page, "tileset", places, true);

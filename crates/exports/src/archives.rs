@@ -11,39 +11,38 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 use crate::mbtiles::write_tables;
-use crate::{Datum, ExportError, Product, Put, Work, write_3dtiles, write_quantized_mesh};
+use crate::{Datum, ExportError, Product, Put, Work, write_quantized_mesh};
 
 /// The last file of a 3TZ: where every other begins, by the MD5 sum of its name (3D Tiles Archive Format 1.3).
 const INDEX: &str = "@3dtilesIndex1@";
 
-/// Writes 3D Tiles as one archive of stored files with an index. Returns what was done to heights.
+/// Writes the files of 3D Tiles that `write` makes as one archive of stored files with an index. Returns what that
+/// returns.
 ///
 /// # Errors
-/// Those of [`write_3dtiles`].
-pub fn write_3tz(
+/// Those of `write`, and when the archive cannot be written.
+pub fn write_3tz<R, E: From<ExportError>>(
     out: &mut impl Write,
-    product: &Product,
-    assumed: Option<Datum>,
-    work: &Work,
-) -> Result<Datum, ExportError> {
-    let (files, datum) = gathered(|put| write_3dtiles(product, assumed, put, work))?;
+    write: impl FnOnce(&Put) -> Result<R, E>,
+) -> Result<R, E> {
+    let (files, told) = gathered(write)?;
     let bytes = archive(&files).map_err(|error| ExportError::write("3TZ")(std::io::Error::other(error)))?;
     out.write_all(&bytes).map_err(ExportError::write("3TZ"))?;
-    Ok(datum)
+    Ok(told)
 }
 
 /// Files of a folder by name.
 type Files = BTreeMap<String, Vec<u8>>;
 
-fn gathered(write: impl FnOnce(&Put) -> Result<Datum, ExportError>) -> Result<(Files, Datum), ExportError> {
+fn gathered<R, E>(write: impl FnOnce(&Put) -> Result<R, E>) -> Result<(Files, R), E> {
     let files = Mutex::new(Files::new());
     let put = |name: &str, bytes: &[u8]| {
         let mut files = files.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         files.insert(name.to_owned(), bytes.to_vec());
         Ok(())
     };
-    let datum = write(&put)?;
-    Ok((files.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner), datum))
+    let told = write(&put)?;
+    Ok((files.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner), told))
 }
 
 fn archive(files: &Files) -> zip::result::ZipResult<Vec<u8>> {
@@ -129,7 +128,7 @@ mod tests {
     use schedule::Workers;
 
     use super::*;
-    use crate::samples;
+    use crate::{samples, write_3dtiles};
 
     #[test]
     fn an_archive_holds_the_files_of_the_folder_and_its_index_says_where_each_begins() {
@@ -137,8 +136,9 @@ mod tests {
         let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
         let product = samples::product();
         let mut out = Cursor::new(Vec::new());
-        write_3tz(&mut out, &product, Some(Datum::Ellipsoid), &work).unwrap();
-        let (files, _) = gathered(|put| write_3dtiles(&product, Some(Datum::Ellipsoid), put, &work)).unwrap();
+        let write = |put: &Put| write_3dtiles(&product, Some(Datum::Ellipsoid), put, &work);
+        write_3tz(&mut out, write).unwrap();
+        let (files, _) = gathered(write).unwrap();
         let bytes = out.into_inner();
         let mut read = ZipArchive::new(Cursor::new(&bytes)).unwrap();
         assert_eq!(read.len(), files.len() + 1);

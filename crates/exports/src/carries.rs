@@ -42,7 +42,7 @@ const TILES: Carries = Carries {
 const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where they are";
 
 /// The table, in the order of the formats.
-pub const CARRIES: [Carries; 16] = [
+pub const CARRIES: [Carries; 17] = [
     Carries {
         format: "modules",
         classes: "a class for each triangle",
@@ -96,6 +96,7 @@ pub const CARRIES: [Carries; 16] = [
     },
     Carries { format: "3dtiles", ..TILES },
     Carries { format: "quantized-mesh", classes: "water alone, as a mask", holes: CLOSED, ..RASTER },
+    Carries { format: "3dtiles-terrain", holes: CLOSED, ..RASTER },
     Carries { format: "3tz", ..TILES },
     Carries {
         format: "mbtiles",

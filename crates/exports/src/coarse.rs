@@ -14,7 +14,8 @@ pub(crate) struct Coarse {
     pub vertices: Vec<u32>,
     /// Corners by place in `vertices`, counter-clockwise.
     pub triangles: Vec<[u32; 3]>,
-    /// Largest distance, straight up or down, between these triangles and those of the mesh, in metres.
+    /// Largest distance, straight up or down, between these triangles and those of the mesh, in metres; a load module's
+    /// side where one is a hole in part.
     pub error_m: f64,
 }
 
@@ -38,7 +39,10 @@ impl Coarse {
             let north_east = north_west + 1;
             coarse.triangles.extend([[south_west, south_east, north_east], [south_west, north_east, north_west]]);
         }
-        let errors = rect.iter().filter_map(|id| product.module(id)).map(error_quanta);
+        let modules = || rect.iter().filter_map(|id| product.module(id));
+        // Where ground ends inside of a load module, these two triangles are there or not: it may be its side off.
+        let ends = modules().filter(|module| has_ground_in_part(module)).map(|module| f64::from(module.side));
+        let errors = modules().map(error_quanta).chain(ends);
         coarse.error_m = errors.fold(0.0, f64::max) / f64::from(QUANTA_PER_METRE);
         coarse
     }
@@ -61,6 +65,12 @@ fn corner_vertex(product: &Product, mesh: &Mesh, row: u32, col: u32) -> u32 {
         }
     }
     unreachable!("the triangles of a load module cover its corners")
+}
+
+/// Whether a load module has both ground and a hole.
+fn has_ground_in_part(module: &LoadModule) -> bool {
+    let holes = module.classes.iter().filter(|class| **class == HOLE_CLASS).count();
+    0 < holes && holes < module.classes.len()
 }
 
 /// Whether no source has a height over more than half of a load module.

@@ -2,6 +2,8 @@
 //! counted from the middle of the Earth.
 
 use source_files::{Crs, plain_datum};
+use store::Area;
+use terrain::ModuleRect;
 
 use crate::{ExportError, Product};
 
@@ -43,7 +45,7 @@ impl Datum {
 }
 
 /// Half the longest axis of WGS 84's ellipsoid, in metres.
-const SEMI_MAJOR_M: f64 = 6_378_137.0;
+pub(crate) const SEMI_MAJOR_M: f64 = 6_378_137.0;
 /// The square of its eccentricity.
 const ECCENTRICITY_SQUARED: f64 = {
     const FLATTENING: f64 = 1.0 / 298.257_223_563;
@@ -55,6 +57,7 @@ const ECCENTRICITY_SQUARED: f64 = {
 pub struct Earth {
     crs: Crs,
     wgs84: Crs,
+    outline: Vec<[f64; 2]>,
     datum: Datum,
     geoid: Option<GeoidGrid>,
 }
@@ -66,19 +69,24 @@ impl Earth {
     /// When the datum is not known or cannot be computed and nothing is assumed, or the coordinate system cannot be
     /// computed.
     pub fn new(product: &Product, assumed: Option<Datum>) -> Result<Self, ExportError> {
-        let datum = match assumed.or_else(|| Datum::named(product.vertical_datum())) {
+        Self::under(&product.manifest.area, product.rect, assumed)
+    }
+
+    /// The same under some load modules of an area.
+    pub(crate) fn under(area: &Area, rect: ModuleRect, assumed: Option<Datum>) -> Result<Self, ExportError> {
+        let datum = match assumed.or_else(|| Datum::named(&area.vertical_datum)) {
             Some(datum) => datum,
-            None => return Err(unknown_datum(product.vertical_datum())),
+            None => return Err(unknown_datum(&area.vertical_datum)),
         };
-        let crs = Crs::named(product.crs()).map_err(|found| ExportError::Impossible {
-            what: format!("the coordinate system {}", product.crs()),
+        let crs = Crs::named(&area.crs).map_err(|found| ExportError::Impossible {
+            what: format!("the coordinate system {}", area.crs),
             found,
             expected: "one that can be computed".into(),
             hint: "this format needs longitude and latitude; export a mesh or a GeoTIFF instead".into(),
         })?;
-        let mut earth = Self { crs, wgs84: Crs::wgs84(), datum, geoid: None };
-        let outline = earth.outline(product)?;
-        let longitudes = || outline.iter().map(|place| place[0]);
+        let mut earth = Self { crs, wgs84: Crs::wgs84(), outline: Vec::new(), datum, geoid: None };
+        earth.outline = outline(area, rect).map(|place_m| earth.lon_lat(place_m)).collect::<Result<_, _>>()?;
+        let longitudes = || earth.outline.iter().map(|place| place[0]);
         let (west, east) = (longitudes().fold(180.0, f64::min), longitudes().fold(-180.0, f64::max));
         if 180.0 < east - west {
             return Err(ExportError::Impossible {
@@ -89,14 +97,31 @@ impl Earth {
             });
         }
         if matches!(datum, Datum::Egm96 | Datum::Egm2008) {
-            earth.geoid = Some(GeoidGrid::over(&outline));
+            earth.geoid = Some(GeoidGrid::over(&earth.outline, [0.0; 2]));
         }
         Ok(earth)
+    }
+
+    /// The same with one grid of the geoid for all: areas that meet have the same heights where they do.
+    pub(crate) fn together(mut all: Vec<Self>) -> Vec<Self> {
+        let step = [0, 1].map(|axis| {
+            let steps = all.iter().filter_map(|earth| Some(earth.geoid.as_ref()?.step[axis]));
+            steps.fold(0.0, f64::max)
+        });
+        for earth in &mut all {
+            earth.geoid = earth.geoid.take().map(|_| GeoidGrid::over(&earth.outline, step));
+        }
+        all
     }
 
     /// What was done to heights.
     pub fn datum(&self) -> Datum {
         self.datum
+    }
+
+    /// The area's coordinate system.
+    pub(crate) fn crs(&self) -> &Crs {
+        &self.crs
     }
 
     /// Longitude and latitude in degrees of a place in the area's system.
@@ -118,13 +143,18 @@ impl Earth {
         }
     }
 
-    /// Longitudes and latitudes along the sides of a product.
-    pub(crate) fn outline(&self, product: &Product) -> Result<Vec<[f64; 2]>, ExportError> {
-        let rect = product.rect;
-        let rows = (rect.south..=rect.north).flat_map(|row| [(row, rect.west), (row, rect.east)]);
-        let cols = (rect.west..=rect.east).flat_map(|col| [(rect.south, col), (rect.north, col)]);
-        rows.chain(cols).map(|(row, col)| self.lon_lat(product.corner_m(row, col))).collect()
+    /// Longitudes and latitudes along the sides of what it is under.
+    pub(crate) fn outline(&self) -> &[[f64; 2]] {
+        &self.outline
     }
+}
+
+/// Corners of load modules along the sides of some of an area.
+fn outline(area: &Area, rect: ModuleRect) -> impl Iterator<Item = [f64; 2]> {
+    let rows = (rect.south..=rect.north).flat_map(move |row| [[rect.west, row], [rect.east, row]]);
+    let cols = (rect.west..=rect.east).flat_map(move |col| [[col, rect.south], [col, rect.north]]);
+    let corner_m = |at: [u32; 2]| [0, 1].map(|axis| area.origin_m[axis] + f64::from(at[axis]) * area.module_side_m);
+    rows.chain(cols).map(corner_m)
 }
 
 fn out_of_range(crs: &Crs, place_m: [f64; 2]) -> ExportError {
@@ -149,7 +179,8 @@ fn unknown_datum(found: &str) -> ExportError {
     }
 }
 
-/// Heights of the geoid EGM96 on a grid of longitudes and latitudes, interpolated between.
+/// Heights of the geoid EGM96 on a grid of longitudes and latitudes, interpolated between. Its lines are multiples of
+/// the step, whatever the area.
 #[derive(Debug)]
 struct GeoidGrid {
     south_west: [f64; 2],
@@ -159,24 +190,28 @@ struct GeoidGrid {
 }
 
 impl GeoidGrid {
-    /// Degrees between nodes at most, where the area is not large: EGM96 knows nothing smaller than half a degree.
+    /// Degrees between nodes, where the area is not large: EGM96 knows nothing smaller than half a degree.
     const STEP_DEGREES: f64 = 0.05;
-    /// Nodes along a side at most, each of which takes a sum of 65,000 terms.
-    const NODES_MAX: f64 = 32.0;
+    /// Cells along a side at most, above which the step is doubled: each node takes a sum of 65,000 terms.
+    const CELLS_MAX: f64 = 32.0;
 
-    fn over(places: &[[f64; 2]]) -> Self {
-        let range = |axis: usize| {
+    /// That over some places, of steps no smaller than some.
+    fn over(places: &[[f64; 2]], step_min: [f64; 2]) -> Self {
+        let along = |axis: usize| {
             let values = || places.iter().map(|place| place[axis]);
-            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
+            let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+            let mut step = Self::STEP_DEGREES.max(step_min[axis]);
+            while Self::CELLS_MAX * step < high - low {
+                step *= 2.0;
+            }
+            let first = (low / step).floor();
+            (first * step, step, ((high / step).ceil() - first).max(1.0) as usize)
         };
-        let [(west, east), (south, north)] = [range(0), range(1)];
-        let nodes = [(west, east), (south, north)]
-            .map(|(low, high)| ((high - low) / Self::STEP_DEGREES).ceil().clamp(1.0, Self::NODES_MAX));
-        let step = [(east - west) / nodes[0], (north - south) / nodes[1]];
-        let (columns, rows) = (nodes[0] as usize + 1, nodes[1] as usize + 1);
+        let [(west, east_step, cols), (south, north_step, rows)] = [along(0), along(1)];
+        let (step, columns, rows) = ([east_step, north_step], cols + 1, rows + 1);
         let node = |index: usize| {
             let (row, col) = ((index / columns) as f64, (index % columns) as f64);
-            egm96::egm96_compute_altitude_offset(south + row * step[1], west + col * step[0])
+            egm96::egm96_compute_altitude_offset((south + row * step[1]).clamp(-90.0, 90.0), west + col * step[0])
         };
         Self { south_west: [west, south], step, columns, metres: (0..rows * columns).map(node).collect() }
     }

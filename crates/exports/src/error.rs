@@ -85,6 +85,16 @@ impl ExportError {
         matches!(self, Self::Stopped { .. })
     }
 
+    /// The same where several databases are read, of which this one is meant.
+    pub(crate) fn of(self, name: &str) -> Self {
+        match self {
+            Self::Impossible { what, found, expected, hint } => {
+                Self::Impossible { what: format!("{name}: {what}"), found, expected, hint }
+            }
+            error => error,
+        }
+    }
+
     /// A file of this name that could not be written.
     pub(crate) fn write(name: &str) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::Write { name: name.to_owned(), source }

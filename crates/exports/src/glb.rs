@@ -288,7 +288,7 @@ fn pad(bytes: &mut Vec<u8>, filler: u8) {
 }
 
 /// The file: a header, a chunk of JSON and a chunk of numbers, each a multiple of four bytes long.
-fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
+pub(crate) fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
     let mut json = document.to_string().into_bytes();
     pad(&mut json, b' ');
     let numbers = if binary.is_empty() { 0 } else { 8 + binary.len() };

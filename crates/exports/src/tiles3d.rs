@@ -30,7 +30,12 @@ use crate::{Datum, ExportError, Product, Put, Sheet, Texture, Work};
 /// # Errors
 /// When a file cannot be written, heights cannot be brought above the ellipsoid, or the work was asked to stop.
 pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work: &Work) -> Result<Datum, ExportError> {
-    let layers = Layers::of(product, assumed, work)?;
+    write_on(product, Earth::new(product, assumed)?, put, work)
+}
+
+/// The same of a product that is set on the globe.
+pub(crate) fn write_on(product: &Product, earth: Earth, put: &Put, work: &Work) -> Result<Datum, ExportError> {
+    let layers = Layers::of(product, earth, work)?;
     let put = |name: &str, bytes: &[u8]| put(name, bytes).map_err(ExportError::write(name));
     let tileset = layers.tileset(work, |rect| layers.square(rect, &|name, made| put(name, &made())))?;
     put("tileset.json", tileset.as_bytes())?;
@@ -51,7 +56,7 @@ impl Tileset {
     /// # Errors
     /// When heights cannot be brought above the ellipsoid, or the work was asked to stop.
     pub fn of(product: &Product, assumed: Option<Datum>, work: &Work) -> Result<Self, ExportError> {
-        let layers = Layers::of(product, assumed, work)?;
+        let layers = Layers::of(product, Earth::new(product, assumed)?, work)?;
         let named = Mutex::new(BTreeMap::new());
         let lock = || named.lock().unwrap_or_else(PoisonError::into_inner);
         let text = layers.tileset(work, |rect| {
@@ -130,8 +135,7 @@ struct Layers {
 }
 
 impl Layers {
-    fn of(product: &Product, assumed: Option<Datum>, work: &Work) -> Result<Self, ExportError> {
-        let earth = Earth::new(product, assumed)?;
+    fn of(product: &Product, earth: Earth, work: &Work) -> Result<Self, ExportError> {
         let layer = |product: Product| {
             let mesh = Mesh::whole(&product).with_sheets(&product);
             let globe = Globe::of(&product, &mesh, &earth, work)?;

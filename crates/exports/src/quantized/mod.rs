@@ -26,7 +26,7 @@ use collar::{GlobeMesh, with_collar};
 use extensions::{CELLS, WaterMask};
 use holes::holes;
 use lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
-use tile::Tile;
+pub(crate) use tile::Tile;
 
 /// Load modules along a tile of the finest level, about.
 const MODULES_PER_TILE: f64 = 5.0;
@@ -49,7 +49,7 @@ pub fn write_quantized_mesh(
     work: &Work,
 ) -> Result<Datum, ExportError> {
     let terrain = QuantizedMesh::of(product, assumed, work)?;
-    for (what, tiles) in [("tiles of triangles", terrain.finest_tiles()), ("tiles of heights", terrain.grid_tiles())] {
+    for (what, tiles) in terrain.tiles() {
         work.each(what, &tiles, |&(level, col, row)| {
             let name = format!("{level}/{col}/{row}.terrain");
             put(&name, &terrain.made(level, col, row)).map_err(ExportError::write(&name))
@@ -140,6 +140,11 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
         (inside(cols, col) && inside(rows, row)).then_some(tile)
     }
 
+    /// All tiles, and what they are.
+    pub(crate) fn tiles(&self) -> [(&'static str, Vec<(u32, i64, i64)>); 2] {
+        [("tiles of triangles", self.finest_tiles()), ("tiles of heights", self.grid_tiles())]
+    }
+
     /// The tiles that hold the triangles themselves.
     fn finest_tiles(&self) -> Vec<(u32, i64, i64)> {
         self.of_tile.keys().map(|&[row, col]| (self.level, col, row)).collect()
@@ -157,9 +162,14 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
 
     /// The bytes of a tile that there is.
     fn made(&self, level: u32, col: i64, row: i64) -> Vec<u8> {
-        let mut tile = if level < self.level { self.grid(level, col, row) } else { self.cut(col, row) };
+        let mut tile = self.tile(level, col, row);
         tile.metadata = level.is_multiple_of(METADATA_LEVELS).then(|| self.below(level, col, row));
         tile.bytes()
+    }
+
+    /// A tile that there is, without what it says of others.
+    pub(crate) fn tile(&self, level: u32, col: i64, row: i64) -> Tile {
+        if level < self.level { self.grid(level, col, row) } else { self.cut(col, row) }
     }
 
     /// A tile of the triangles themselves.

@@ -73,35 +73,9 @@ impl Tile {
         self.triangles.iter().map(area).sum::<i64>() as f64 / (2 * STEPS * STEPS) as f64
     }
 
-    /// The bytes of its file.
-    pub(crate) fn bytes(&self) -> Vec<u8> {
+    /// Where it lies on the globe.
+    pub(crate) fn placed(&self) -> Placed {
         let nodes: Vec<Node> = self.nodes.iter().map(|node| self.lowest[&(node.x, node.y)]).collect();
-        let ladder = Ladder::of(&nodes);
-        let mut bytes = Vec::with_capacity(128 + 10 * nodes.len() + 6 * self.triangles.len());
-        self.put_header(&mut bytes, &nodes, &ladder);
-        bytes.extend_from_slice(&(nodes.len() as u32).to_le_bytes());
-        let (west, south) = (self.col * STEPS, self.row * STEPS);
-        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| ladder.rung(n.h)];
-        for part in parts {
-            let mut before = 0;
-            for node in &nodes {
-                bytes.extend_from_slice(&zigzag(part(node) - before).to_le_bytes());
-                before = part(node);
-            }
-        }
-        let wide = usize::from(u16::MAX) + 1 < nodes.len();
-        if wide {
-            bytes.resize(bytes.len().next_multiple_of(4), 0);
-        }
-        self.put_triangles(&mut bytes, wide);
-        self.put_edges(&mut bytes, wide);
-        put_normals(&mut bytes, &nodes);
-        self.water.iter().for_each(|water| water.put(&mut bytes));
-        self.metadata.iter().for_each(|metadata| put_metadata(&mut bytes, metadata));
-        bytes
-    }
-
-    fn put_header(&self, bytes: &mut Vec<u8>, nodes: &[Node], ladder: &Ladder) {
         let place = |node: &Node| earth_centred(lon_lat(self.level, [node.x, node.y]), height_m(node.h));
         let places: Vec<[f64; 3]> = nodes.iter().map(place).collect();
         let end = |pick: fn(f64, f64) -> f64, from: f64| {
@@ -111,14 +85,44 @@ impl Tile {
         let middle = [0, 1, 2].map(|axis| f64::midpoint(low[axis], high[axis]));
         let distance = |place: &[f64; 3]| dot(minus(*place, middle), minus(*place, middle)).sqrt();
         let radius = places.iter().map(distance).fold(0.0, f64::max);
-        let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
-        middle.into_iter().for_each(&mut put);
-        let (foot, top) = (height_m(ladder.low) as f32, height_m(ladder.high) as f32);
-        bytes.extend_from_slice(&foot.to_le_bytes());
-        bytes.extend_from_slice(&top.to_le_bytes());
-        for number in middle.into_iter().chain([radius]).chain(horizon_point(middle, &places)) {
-            bytes.extend_from_slice(&number.to_le_bytes());
+        let horizon = horizon_point(middle, &places);
+        Placed { ladder: Ladder::of(&nodes), nodes, places, middle, radius, horizon }
+    }
+
+    /// The bytes of its file.
+    pub(crate) fn bytes(&self) -> Vec<u8> {
+        let placed = self.placed();
+        let (nodes, ladder) = (&placed.nodes, &placed.ladder);
+        let mut bytes = Vec::with_capacity(128 + 10 * nodes.len() + 6 * self.triangles.len());
+        placed.put_header(&mut bytes);
+        bytes.extend_from_slice(&(nodes.len() as u32).to_le_bytes());
+        let (west, south) = (self.col * STEPS, self.row * STEPS);
+        let parts: [&dyn Fn(&Node) -> i64; 3] = [&|n| n.x - west, &|n| n.y - south, &|n| ladder.rung(n.h)];
+        for part in parts {
+            let mut before = 0;
+            for node in nodes {
+                bytes.extend_from_slice(&zigzag(part(node) - before).to_le_bytes());
+                before = part(node);
+            }
         }
+        let wide = usize::from(u16::MAX) + 1 < nodes.len();
+        if wide {
+            bytes.resize(bytes.len().next_multiple_of(4), 0);
+        }
+        self.put_triangles(&mut bytes, wide);
+        for along in self.edges() {
+            bytes.extend_from_slice(&(along.len() as u32).to_le_bytes());
+            along.iter().for_each(|&index| put_index(&mut bytes, index, wide));
+        }
+        put_normals(&mut bytes, nodes);
+        self.water.iter().for_each(|water| water.put(&mut bytes));
+        self.metadata.iter().for_each(|metadata| put_metadata(&mut bytes, metadata));
+        bytes
+    }
+
+    /// Corners of its triangles among its nodes.
+    pub(crate) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
     }
 
     /// Triangles by "high water mark": how far below the next new vertex each one is.
@@ -131,8 +135,8 @@ impl Tile {
         }
     }
 
-    /// Vertices on the western, southern, eastern and northern border, in order along it.
-    fn put_edges(&self, bytes: &mut Vec<u8>, wide: bool) {
+    /// Vertices on the western, southern, eastern and northern border, each from the south or the west.
+    pub(crate) fn edges(&self) -> [Vec<u32>; 4] {
         let (west, south) = (self.col * STEPS, self.row * STEPS);
         let edges: [&Along; 4] = [
             &|n| (n.x == west).then_some(n.y),
@@ -140,12 +144,42 @@ impl Tile {
             &|n| (n.x == west + STEPS).then_some(n.y),
             &|n| (n.y == south + STEPS).then_some(n.x),
         ];
-        for edge in edges {
+        edges.map(|edge| {
             let mut along: Vec<(i64, u32)> =
                 (0..).zip(&self.nodes).filter_map(|(index, node)| Some((edge(node)?, index))).collect();
             along.sort_unstable();
-            bytes.extend_from_slice(&(along.len() as u32).to_le_bytes());
-            along.iter().for_each(|&(_, index)| put_index(bytes, index, wide));
+            along.into_iter().map(|(_, index)| index).collect()
+        })
+    }
+}
+
+/// A tile on the globe, in metres from the middle of the Earth.
+pub(crate) struct Placed {
+    /// Its vertices: of those at one place of the lattice the lowest.
+    pub nodes: Vec<Node>,
+    /// Where they lie.
+    pub places: Vec<[f64; 3]>,
+    /// The middle of the sphere around them.
+    pub middle: [f64; 3],
+    /// Half of what it measures.
+    pub radius: f64,
+    /// The point that is hidden by the horizon only if all of the tile is, in axes in which the ellipsoid is a sphere of
+    /// radius one.
+    pub horizon: [f64; 3],
+    ladder: Ladder,
+}
+
+impl Placed {
+    /// The lowest and the highest height above the ellipsoid, in metres.
+    pub(crate) fn heights_m(&self) -> [f64; 2] {
+        [self.ladder.low, self.ladder.high].map(height_m)
+    }
+
+    fn put_header(&self, bytes: &mut Vec<u8>) {
+        self.middle.iter().for_each(|number| bytes.extend_from_slice(&number.to_le_bytes()));
+        self.heights_m().iter().for_each(|&height_m| bytes.extend_from_slice(&(height_m as f32).to_le_bytes()));
+        for number in self.middle.into_iter().chain([self.radius]).chain(self.horizon) {
+            bytes.extend_from_slice(&number.to_le_bytes());
         }
     }
 }

@@ -108,7 +108,7 @@ impl<'a> Pyramid<'a> {
         }
         // Heights stay as they are, so their datum does not matter.
         let earth = Earth::new(product, Some(Datum::Ellipsoid))?;
-        let outline = earth.outline(product)?;
+        let outline = earth.outline();
         let beyond = outline.iter().map(|place| place[1]).find(|latitude| LATITUDE_MAX < latitude.abs());
         if let Some(latitude) = beyond {
             return Err(ExportError::Impossible {
@@ -118,7 +118,7 @@ impl<'a> Pyramid<'a> {
                 hint: "export a GeoTIFF, or 3D Tiles for a globe".into(),
             });
         }
-        let extent = Extent::of(&outline);
+        let extent = Extent::of(outline);
         let finest = extent.finest_level(map.pixels, product.frame.spacing.metres());
         let coarsest = extent.coarsest_level(finest);
         Ok(Self { product, map, earth, extent, coarsest, finest })

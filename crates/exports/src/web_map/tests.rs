@@ -103,7 +103,7 @@ fn an_archive_has_a_header_its_tiles_in_order_and_the_same_bytes_every_time() {
 fn ground_beyond_the_end_of_web_mercator_is_refused() {
     let mut product = samples::product();
     product.manifest.area.crs = "EPSG:3413".into();
-    (product.frame.origin_east_m, product.frame.origin_north_m) = (100_000.0, -300_000.0);
+    product.manifest.area.origin_m = [100_000.0, -300_000.0];
     let error = Pyramid::of(&product, MAP).err().unwrap();
     assert!(error.to_string().contains("where web mercator ends"), "{error}");
     let error = Pyramid::of(&samples::product(), WebMap { pixels: 300, ..MAP }).err().unwrap();

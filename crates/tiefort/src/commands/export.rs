@@ -1,6 +1,6 @@
 //! `tiefort export`: a finished database in another program's format.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use build::CompileError;
@@ -13,6 +13,7 @@ use terrain::{ModuleId, PostRect};
 use views::grouped;
 
 use super::export_formats::{Format, HeightEncoding, HeightmapEngine, Layer};
+use super::export_together::Several;
 use crate::arguments::{MeshOrigin, Workers, row_col};
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
@@ -28,6 +29,7 @@ Examples:
   tiefort export ntc.tdb --format gpkg --out ntc.gpkg
   tiefort export ntc.tdb --format geotiff --layer residual --out residual.tif
   tiefort export ntc.tdb --format 3dtiles --assume-datum EGM96 --out ntc_3dtiles
+  tiefort export ntc.tdb desert.tdb --format 3tz --assume-datum EGM96 --out b.3tz
   tiefort export ntc.tdb --format usd --out ntc_usd
   tiefort export ntc.tdb --format terrain-rgb --out ntc.pmtiles
   tiefort export ntc.tdb --format heightmap --engine unity --out ntc_unity
@@ -39,9 +41,12 @@ from the south-west corner of what is exported, as usd and gazebo are; the file
 itself, or NAME.json beside it, says where that is. Load modules are named
 ROW,COL from the south-west, nodes of a glb r0003c0017. A geotiff is cloud
 optimised, with overviews; it names the system of its heights where that is
-known. 3tz is 3dtiles in one file, mbtiles quantized-mesh in one; these four
-want heights above the ellipsoid: they know EGM96 and the ellipsoid, and refuse
-any other datum unless told what to take it for. terrain-rgb is a file of
+known. 3tz is 3dtiles in one file, mbtiles quantized-mesh in one; these and
+3dtiles-terrain want heights above the ellipsoid: they know EGM96 and the
+ellipsoid, and refuse any other datum unless told what to take it for. Several databases become one
+tileset (3dtiles, 3tz), each in a folder of its number, in any coordinate
+systems; where they overlap, that of the smaller spacing is there, then that of
+more triangles, then the first. terrain-rgb is a file of
 MBTiles or PMTiles by its name; its heights stay above the database's datum.
 
 Ribbons are bands over roads, rails and streams that are lines in the ground, 5
@@ -58,9 +63,9 @@ fn after_help() -> String {
 #[derive(Args)]
 #[command(after_help = after_help())]
 pub struct Arguments {
-    /// Folder of the terrain database
-    #[arg(value_name = "DIR")]
-    database: PathBuf,
+    /// Folder of the terrain database; for 3dtiles and 3tz several, which become one tileset
+    #[arg(value_name = "DIR", required = true)]
+    databases: Vec<PathBuf>,
     /// What to write
     #[arg(long, value_enum)]
     format: Format,
@@ -80,7 +85,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DEM")]
     against: Option<PathBuf>,
     /// What to take heights to be above, whatever the database says: EGM96, ellipsoid, or metres that their datum
-    /// lies above the ellipsoid; for 3dtiles, 3tz, quantized-mesh and mbtiles only
+    /// lies above the ellipsoid; for 3dtiles, 3dtiles-terrain, 3tz, quantized-mesh and mbtiles only
     #[arg(long, value_name = "DATUM", value_parser = datum, allow_hyphen_values = true)]
     assume_datum: Option<Datum>,
     /// Whose heightmaps; for heightmap only
@@ -121,6 +126,11 @@ pub struct Arguments {
 }
 
 impl Arguments {
+    /// The database, where only one can be.
+    fn database(&self) -> &Path {
+        &self.databases[0]
+    }
+
     /// How many things are done at once.
     pub fn workers(&self) -> usize {
         self.workers.count()
@@ -179,7 +189,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 /// When it cannot be, the database cannot be read, or nothing can be written there.
 pub fn checked(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     check(arguments)?;
-    export(arguments, work)
+    if arguments.databases.len() == 1 {
+        return export(arguments, work);
+    }
+    let read = |database: &Path| {
+        let product = prepared(arguments, database, work)?;
+        let holds = summary(arguments.format, &product, None);
+        Ok((product, holds))
+    };
+    let Arguments { databases, format, assume_datum, out, .. } = arguments;
+    let several = Several { databases, format: *format, assumed: *assume_datum, out, read: &read };
+    several.check(arguments.modules.is_some())?;
+    several.export(work)
 }
 
 /// Refuses what cannot be, before any work.
@@ -197,7 +218,7 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
         let message = "found --assume-datum with a format whose heights stay as they are, expected none";
         return Err(Failure::new(
             message,
-            "leave --assume-datum out; only 3dtiles, 3tz, quantized-mesh and mbtiles need it",
+            "leave --assume-datum out; only 3dtiles, 3dtiles-terrain, 3tz, quantized-mesh and mbtiles need it",
         ));
     }
     let has_textures = arguments.format.carries().textures != LEFT_OUT;
@@ -252,10 +273,7 @@ fn levels(arguments: &Arguments) -> Levels {
 fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     let is_folder = arguments.format.extensions().is_empty();
     let folder = is_folder.then(|| NewFolder::begin(&arguments.out)).transpose()?;
-    let mut product = Product::read(&arguments.database, arguments.modules, levels(arguments), work)?;
-    product.has_ribbons = arguments.ribbons;
-    product.name_materials(arguments.materials.clone())?;
-    open_imagery(arguments, &mut product)?;
+    let product = prepared(arguments, arguments.database(), work)?;
     match arguments.format {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
@@ -273,6 +291,9 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
             Format::QuantizedMesh => {
                 said = Some(exports::write_quantized_mesh(&product, arguments.assume_datum, &put, work)?);
             }
+            Format::Tiles3dTerrain => {
+                said = Some(exports::write_3dtiles_terrain(&product, arguments.assume_datum, &put, work)?);
+            }
             Format::Usd => exports::write_usd(&product, &put, work)?,
             Format::Gazebo => exports::write_gazebo(&product, &put, work)?,
             Format::Heightmap => {
@@ -283,6 +304,15 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         folder.finish()?;
     }
     Ok(summary(arguments.format, &product, said))
+}
+
+/// What of a database is exported, as it is to be seen.
+fn prepared(arguments: &Arguments, database: &Path, work: &Work) -> Result<Product, Failure> {
+    let mut product = Product::read(database, arguments.modules, levels(arguments), work)?;
+    product.has_ribbons = arguments.ribbons;
+    product.name_materials(arguments.materials.clone())?;
+    open_imagery(arguments, &mut product)?;
+    Ok(product)
 }
 
 /// Lays orthophotos over what is exported, where some are named.
@@ -342,7 +372,7 @@ fn write_globe_file(arguments: &Arguments, product: &Product, work: &Work) -> Re
     let mut said = None;
     match arguments.format {
         Format::Archive => files::write_whole_or(&arguments.out, |out| {
-            said = Some(exports::write_3tz(out, product, assumed, work)?);
+            said = Some(exports::write_3tz(out, |put| exports::write_3dtiles(product, assumed, put, work))?);
             Ok(())
         })?,
         Format::Mbtiles => files::make_whole(&arguments.out, |path| {
@@ -367,21 +397,21 @@ fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result
     if arguments.layer != Some(Layer::Residual) {
         return files::write_whole_or(&arguments.out, |out| Ok(exports::write_surface(out, product, work)?));
     }
-    let ground = BuiltFrom::open(&arguments.database, arguments.against.as_deref())?;
+    let ground = BuiltFrom::open(arguments.database(), arguments.against.as_deref())?;
     let fault = |error: CompileError| ExportError::Ground { message: error.to_string(), hint: error.hint() };
     let heights = |rect: PostRect| ground.heights(rect).map_err(|error| fault(error.into()));
     files::write_whole_or(&arguments.out, |out| Ok(exports::write_residual(out, product, &heights, work)?))
 }
 
 fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
-    let report = Folder::new(&arguments.database).report()?;
-    let job = Job::from_text(&product.manifest.job, &arguments.database)?;
+    let report = Folder::new(arguments.database()).report()?;
+    let job = Job::from_text(&product.manifest.job, arguments.database())?;
     let window = [job.limits.window.rows, job.limits.window.cols];
     files::make_whole(&arguments.out, |path| Ok(exports::write_gpkg(path, product, &report, window, work)?))
 }
 
 fn write_features(arguments: &Arguments) -> Result<(), Failure> {
-    let opened = Opened::open(&arguments.database)?;
+    let opened = Opened::open(arguments.database())?;
     let Some((level, told)) = read_told(&opened)? else {
         let message = "found --format features with a database without roads and water, expected one with some";
         return Err(Failure::new(message, "[features] in a job names their files"));

@@ -26,6 +26,9 @@ pub(super) enum Format {
     Tiles3d,
     /// A folder of quantized-mesh 1.0 terrain, for globes
     QuantizedMesh,
+    /// A folder of 3D Tiles 1.1 that CesiumJS 1.135 and later take for terrain
+    #[value(name = "3dtiles-terrain")]
+    Tiles3dTerrain,
     /// 3D Tiles in one archive
     #[value(name = "3tz")]
     Archive,
@@ -96,7 +99,7 @@ impl Format {
             Format::Mbtiles => &["mbtiles"],
             Format::TerrainRgb => &["mbtiles", "pmtiles"],
             Format::Modules | Format::Openflight | Format::Tiles3d | Format::QuantizedMesh => &[],
-            Format::Usd | Format::Heightmap | Format::Gazebo => &[],
+            Format::Tiles3dTerrain | Format::Usd | Format::Heightmap | Format::Gazebo => &[],
         }
     }
 
@@ -112,14 +115,15 @@ impl Format {
 
     /// Whether it has room for the ground alone, and decks are left out.
     pub(super) fn is_without_decks(self) -> bool {
-        matches!(
-            self,
-            Format::Geotiff | Format::QuantizedMesh | Format::Mbtiles | Format::TerrainRgb | Format::Heightmap
-        )
+        matches!(self, Format::Geotiff | Format::TerrainRgb | Format::Heightmap) || self.is_terrain_for_globes()
     }
 
     /// Whether its heights are above the ellipsoid of WGS 84.
     pub(super) fn is_for_globes(self) -> bool {
-        matches!(self, Format::Tiles3d | Format::QuantizedMesh | Format::Archive | Format::Mbtiles)
+        matches!(self, Format::Tiles3d | Format::Archive) || self.is_terrain_for_globes()
+    }
+
+    fn is_terrain_for_globes(self) -> bool {
+        matches!(self, Format::QuantizedMesh | Format::Mbtiles | Format::Tiles3dTerrain)
     }
 }

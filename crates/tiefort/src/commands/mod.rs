@@ -9,6 +9,7 @@ mod diff;
 pub mod explain;
 pub mod export;
 mod export_formats;
+mod export_together;
 mod fetch;
 mod fidelity;
 mod inadequate;

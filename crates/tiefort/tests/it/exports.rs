@@ -14,7 +14,7 @@ fn built() -> Scene {
 }
 
 /// Formats whose heights are above the ellipsoid.
-const FOR_GLOBES: [&str; 4] = ["3dtiles", "quantized-mesh", "3tz", "mbtiles"];
+const FOR_GLOBES: [&str; 5] = ["3dtiles", "quantized-mesh", "3dtiles-terrain", "3tz", "mbtiles"];
 
 #[test]
 fn every_format_is_written_and_the_same_every_time() {
@@ -29,6 +29,7 @@ fn every_format_is_written_and_the_same_every_time() {
         ("openflight", "flt"),
         ("3dtiles", "tiles"),
         ("quantized-mesh", "terrain"),
+        ("3dtiles-terrain", "implicit"),
         ("3tz", "tiles.3tz"),
         ("mbtiles", "terrain.mbtiles"),
         ("terrain-rgb", "map.mbtiles"),
@@ -128,6 +129,7 @@ fn every_format_leaves_holes_out_or_marks_them_and_says_so() {
         ("openflight", "flt", left_out),
         ("3dtiles", "tiles", left_out),
         ("quantized-mesh", "terrain", "holes.geojson says where they are"),
+        ("3dtiles-terrain", "implicit", "holes.geojson says where they are"),
         ("terrain-rgb", "map.pmtiles", "triangles over holes are 0 m high, as places outside of the area"),
         ("3tz", "tiles.3tz", left_out),
         ("mbtiles", "terrain.mbtiles", "the entry holes of metadata says where they are"),

@@ -11,6 +11,7 @@ mod comparing;
 mod correlating;
 mod documents;
 mod exports;
+mod exports_together;
 mod features;
 #[cfg(feature = "fetch")]
 mod fetch;
