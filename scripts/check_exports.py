@@ -7,7 +7,7 @@
 With --holes a database with holes is built and checked, too, with --bridge one with a bridge over a valley, with
 --together three that become one tileset (trimesh and embreex). PROGRAM is target/release/tiefort unless said. Needs
 rasterio, rio-cogeo, meshio, geopandas, trimesh, rtree, pyogrio, pyproj, quantized-mesh-tile, pmtiles, pillow and numpy;
-osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco;
+osgconv (Debian's openscenegraph); a Python that has QGIS (Debian's python3-qgis); usd-core and mujoco; eclipse-sumo;
 Debian's libsdformat-dev; chromium and node for glTF and CesiumJS, which also loads from `tiefort serve`, with
 
     npm install --prefix DIR 3d-tiles-tools@0.5.4 cesium@1.145.0 gltf-validator@2.0.0-dev.3.10 puppeteer-core@24.43.1
@@ -37,7 +37,7 @@ import numpy
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 import read_slm  # noqa: E402
-from exports import engines, objects, together  # noqa: E402
+from exports import engines, objects, sumo, together  # noqa: E402
 
 HERE = pathlib.Path(__file__).parent
 HOLE = 255
@@ -1003,7 +1003,7 @@ CHECKS = [
     ("cesium", check_cesium),
     ("serve", check_serve),
     *[(name, functools.partial(check, tools=TOOLS)) for name, check in
-      engines.CHECKS + objects.CHECKS],
+      engines.CHECKS + objects.CHECKS + sumo.CHECKS],
 ]
 
 if __name__ == "__main__":
