@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::earth::SEMI_MAJOR_M;
 use crate::glb::container;
 use crate::mesh::minus;
-use crate::quantized::Tile;
+use crate::quantized::{Tile, TileNumbers};
 use crate::{Datum, ExportError, Product, Put, QuantizedMesh, Work};
 
 /// Levels of a subtree.
@@ -134,7 +134,7 @@ enum Kind {
     Vector,
 }
 
-fn tileset(terrain: &QuantizedMesh<&Product>, product: &Product, all: &BTreeMap<(u32, i64, i64), Facts>) -> Value {
+fn tileset(terrain: &QuantizedMesh<&Product>, product: &Product, all: &BTreeMap<TileNumbers, Facts>) -> Value {
     let heights = |at: usize| all.values().map(move |facts| facts[at]);
     let (low, high) = (heights(0).fold(f64::INFINITY, f64::min), heights(1).fold(f64::NEG_INFINITY, f64::max));
     let levels = all.keys().map(|(level, ..)| level + 1).max().unwrap_or(0);
@@ -182,7 +182,7 @@ fn tileset(terrain: &QuantizedMesh<&Product>, product: &Product, all: &BTreeMap<
 }
 
 /// The file of the subtree below a tile: which tiles and which subtrees there are, in Morton order, and the table.
-fn subtree(all: &BTreeMap<(u32, i64, i64), Facts>, (level, col, row): (u32, i64, i64)) -> Vec<u8> {
+fn subtree(all: &BTreeMap<TileNumbers, Facts>, (level, col, row): TileNumbers) -> Vec<u8> {
     let below = |depth: u32| {
         let at = move |index: i64| {
             let [x, y] = [0, 1].map(|axis| (0..depth).fold(0, |at, bit| at | (index >> (2 * bit + axis) & 1) << bit));

@@ -191,4 +191,19 @@ mod tests {
             assert!((a - b).abs() < 1e-9, "{north}: {a} {b}");
         }
     }
+
+    #[test]
+    fn an_area_that_cannot_be_set_on_the_globe_is_named() {
+        let with = |change: &dyn Fn(&mut store::Area), parts: [&str; 2]| {
+            let mut manifest = samples::product().manifest;
+            change(&mut manifest.area);
+            let named = vec![("one.tdb".to_owned(), samples::product().manifest), ("two.tdb".to_owned(), manifest)];
+            let error = Together::of(named, None).err().unwrap().to_string();
+            assert!(parts.iter().all(|part| error.contains(part)), "{error}");
+        };
+        with(&|_| {}, ["one.tdb and two.tdb", "the same database twice"]);
+        with(&|area| area.vertical_datum.clear(), ["two.tdb: ", "unknown datum"]);
+        with(&|area| area.vertical_datum = "NAVD88".into(), ["two.tdb: ", "NAVD88, which cannot be computed"]);
+        with(&|area| area.crs = "EPSG:9999999".into(), ["two.tdb: ", "EPSG:9999999"]);
+    }
 }

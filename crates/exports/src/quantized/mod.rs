@@ -34,6 +34,8 @@ const MODULES_PER_TILE: f64 = 5.0;
 const DEGREE_M: f64 = 111_320.0;
 /// Squares of heights along a side of a tile above the finest level.
 const GRID: i64 = 64;
+/// Level, column and row of a tile, these from the south-west.
+pub(crate) type TileNumbers = (u32, i64, i64);
 /// Levels between tiles that list those below them.
 const METADATA_LEVELS: u32 = 10;
 
@@ -128,7 +130,7 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
     }
 
     /// Level, column and row of `LEVEL/COLUMN/ROW.terrain`, where there is such a tile.
-    fn tile_named(&self, name: &str) -> Option<(u32, i64, i64)> {
+    fn tile_named(&self, name: &str) -> Option<TileNumbers> {
         let mut parts = name.strip_suffix(".terrain")?.split('/');
         let tile = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
         let (level, col, row) = tile;
@@ -141,17 +143,17 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
     }
 
     /// All tiles, and what they are.
-    pub(crate) fn tiles(&self) -> [(&'static str, Vec<(u32, i64, i64)>); 2] {
+    pub(crate) fn tiles(&self) -> [(&'static str, Vec<TileNumbers>); 2] {
         [("tiles of triangles", self.finest_tiles()), ("tiles of heights", self.grid_tiles())]
     }
 
     /// The tiles that hold the triangles themselves.
-    fn finest_tiles(&self) -> Vec<(u32, i64, i64)> {
+    fn finest_tiles(&self) -> Vec<TileNumbers> {
         self.of_tile.keys().map(|&[row, col]| (self.level, col, row)).collect()
     }
 
     /// The tiles above, each a grid of heights.
-    fn grid_tiles(&self) -> Vec<(u32, i64, i64)> {
+    fn grid_tiles(&self) -> Vec<TileNumbers> {
         let mut all = BTreeSet::new();
         for level in 0..self.level {
             let (cols, rows) = self.bounds.tiles(self.level, level);

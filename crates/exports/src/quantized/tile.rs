@@ -163,8 +163,8 @@ pub(crate) struct Placed {
     pub middle: [f64; 3],
     /// Half of what it measures.
     pub radius: f64,
-    /// The point that is hidden by the horizon only if all of the tile is, in axes in which the ellipsoid is a sphere of
-    /// radius one.
+    /// The point that is hidden by the horizon only if all of the tile is, in axes in which the ellipsoid is a sphere
+    /// of radius one.
     pub horizon: [f64; 3],
     ladder: Ladder,
 }

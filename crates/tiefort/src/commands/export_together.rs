@@ -11,6 +11,9 @@ use crate::failure::Failure;
 use crate::files;
 use crate::new_folder::NewFolder;
 
+/// Reads a database as it is to be seen, and says in words what it holds.
+type Read<'a> = dyn Fn(&Path) -> Result<(Product, String), Failure> + 'a;
+
 /// Databases that become one tileset.
 pub(super) struct Several<'a> {
     pub databases: &'a [PathBuf],
@@ -18,8 +21,7 @@ pub(super) struct Several<'a> {
     /// What to take all heights to be above.
     pub assumed: Option<Datum>,
     pub out: &'a Path,
-    /// Reads one of them as it is to be seen, and says in words what it holds.
-    pub read: &'a dyn Fn(&Path) -> Result<(Product, String), Failure>,
+    pub read: &'a Read<'a>,
 }
 
 impl Several<'_> {
