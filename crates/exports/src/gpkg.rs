@@ -7,12 +7,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use rusqlite::{Connection, ToSql, params};
-use source_files::geopackage_parts::{Extent, Layer, Package, add_index, polygon, polygon_z};
+use source_files::geopackage_parts::{Extent, Layer, Package, add_index, line_z, polygon, polygon_z};
 use store::{Report, ReportPlace};
-use terrain::{Decks, HOLE_CLASS, ModuleId, ModuleRect, ModuleVertex, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{
+    Decks, HOLE_CLASS, LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleRect, ModuleVertex,
+    QUANTA_PER_METRE, metres_of_quanta,
+};
 
 use crate::classes::HOLE_NAME;
-use crate::gpkg_objects::add_objects;
+use crate::gpkg_objects::{add_objects, style_of};
+use crate::gpkg_styles::Style;
 use crate::{ExportError, Product, Step, Work, gpkg_styles};
 
 const MODULES: Layer = Layer {
@@ -77,6 +81,26 @@ const TRIANGLES: Layer = Layer {
 /// Listed only where there are decks.
 const DECKS: Layer = Layer { name: "decks", description: "triangles of the decks of bridges", ..TRIANGLES };
 
+/// Listed only where there are ways.
+const LINES: Layer = Layer {
+    name: "lines",
+    description: "middle lines of roads, rails, rivers and breaklines, whether they are in the ground or not",
+    columns: &[
+        ("module_row", "INTEGER"),
+        ("module_col", "INTEGER"),
+        ("class", "INTEGER"),
+        ("class_name", "TEXT"),
+        ("kind", "TEXT"),
+        ("form", "TEXT"),
+        ("storey", "TEXT"),
+        ("kept", "BOOLEAN"),
+        ("in_ground", "BOOLEAN"),
+        ("width_m", "DOUBLE"),
+    ],
+    geometry: "LINESTRING",
+    has_z: true,
+};
+
 /// Writes a GeoPackage at `path`, where no file may be. `window` is the rows and columns of load modules that a window
 /// of the report has.
 ///
@@ -102,17 +126,27 @@ pub fn write_gpkg(
     package.add_tiles(product).map_err(fault)?;
     let names: Vec<&str> = report.classes.iter().map(|class| class.name.as_str()).collect();
     package.add_triangles(product, &names, work, fault)?;
-    let mut layers = vec![&MODULES, &BREACHES, &TILES, &TRIANGLES];
+    let (ground, ways) = (class_values(product, &names), way_values(product, &names));
+    let mut layers = vec![
+        (&MODULES, Style::Outlined("70,70,70")),
+        (&BREACHES, Style::Outlined("200,40,20")),
+        (&TILES, Style::Outlined("0,70,160")),
+        (&TRIANGLES, Style::ByClass(&ground)),
+    ];
     if 0 < product.deck_triangles() {
         package.add_decks(product, &names).map_err(fault)?;
-        layers.push(&DECKS);
+        layers.push((&DECKS, Style::ByClass(&ground)));
     }
-
-    let with_classes: Vec<&str> = layers[3..].iter().map(|layer| layer.name).collect();
-    gpkg_styles::add(&transaction, &with_classes, &class_values(product, &names)).map_err(fault)?;
-    layers.extend(add_objects(&package.0, product, extent(product, product.rect)).map_err(fault)?);
-    for layer in layers {
-        add_index(&transaction, layer.name).map_err(fault)?;
+    if !ways.is_empty() {
+        package.add_lines(product, &names).map_err(fault)?;
+        layers.push((&LINES, Style::LinesByClass(&ways)));
+    }
+    let objects = add_objects(&package.0, product, extent(product, product.rect)).map_err(fault)?;
+    layers.extend(objects.into_iter().map(|layer| (layer, style_of(layer))));
+    let styles: Vec<(&str, Style)> = layers.into_iter().map(|(layer, style)| (layer.name, style)).collect();
+    gpkg_styles::add(&transaction, &styles).map_err(fault)?;
+    for (layer, _) in styles {
+        add_index(&transaction, layer).map_err(fault)?;
     }
     transaction.commit().map_err(fault)
 }
@@ -127,6 +161,32 @@ fn class_name(names: &[&str], class: u8) -> String {
 fn class_values(product: &Product, names: &[&str]) -> BTreeMap<u8, String> {
     let classes = product.modules.iter().flat_map(|module| module.classes.iter().chain(&module.decks.classes));
     classes.map(|&class| (class, class_name(names, class))).collect()
+}
+
+/// The name of every class that a way has, and its number.
+fn way_values(product: &Product, names: &[&str]) -> BTreeMap<u8, String> {
+    product.lines.iter().flatten().map(|line| (line.class, class_name(names, line.class))).collect()
+}
+
+/// What a line is called by its kind, its form and where it runs.
+fn way_words(traits: &LineTraits) -> [&'static str; 3] {
+    let kind = match traits.kind {
+        LineKind::Travelled => "travelled",
+        LineKind::Channel => "channel",
+        LineKind::Breakline => "breakline",
+    };
+    let form = match traits.form {
+        LineForm::Nothing => "none",
+        LineForm::Line => "line",
+        LineForm::Strip => "strip",
+        LineForm::Bench => "bench",
+    };
+    let storey = match traits.storey {
+        LineStorey::Ground => "ground",
+        LineStorey::Bridge => "bridge",
+        LineStorey::Tunnel => "tunnel",
+    };
+    [kind, form, storey]
 }
 
 /// The triangles of a load module's ground, or of its decks.
@@ -235,6 +295,30 @@ impl Layers<'_> {
         Ok(())
     }
 
+    fn add_lines(&self, product: &Product, names: &[&str]) -> rusqlite::Result<()> {
+        let mut add = self.0.begin(&LINES, extent(product, product.rect))?;
+        for (module, lines) in product.modules.iter().zip(&product.lines) {
+            for line in lines {
+                let places: Vec<[f64; 3]> = line.vertices.iter().map(|v| place_m(product, module.id, *v)).collect();
+                let [kind, form, storey] = way_words(&line.traits);
+                add.execute(params![
+                    line_z(self.0.srs, &places),
+                    module.id.row,
+                    module.id.col,
+                    line.class,
+                    class_name(names, line.class),
+                    kind,
+                    form,
+                    storey,
+                    line.traits.is_kept,
+                    line.traits.is_in_ground,
+                    metres_of_quanta(line.traits.width.into()),
+                ])?;
+            }
+        }
+        Ok(())
+    }
+
     fn add_triangles_of(
         &self,
         add: &mut rusqlite::Statement,
@@ -242,13 +326,8 @@ impl Layers<'_> {
         names: &[&str],
         (id, triangles): (ModuleId, Triangles),
     ) -> rusqlite::Result<()> {
-        let [east_m, north_m] = product.corner_m(id.row, id.col);
-        let metre = f64::from(QUANTA_PER_METRE);
         for (&triangle, class) in triangles.corners.iter().zip(triangles.classes) {
-            let corners = triangle.map(|v| {
-                let v = triangles.vertices[usize::from(v)];
-                [east_m + f64::from(v.x) / metre, north_m + f64::from(v.y) / metre, metres_of_quanta(v.z)]
-            });
+            let corners = triangle.map(|v| place_m(product, id, triangles.vertices[usize::from(v)]));
             let [a, b, c] = corners;
             let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
             let slope = normal[0].hypot(normal[1]).atan2(normal[2]).to_degrees();
@@ -262,6 +341,13 @@ impl Layers<'_> {
     fn rectangle(&self, [west, south, east, north]: Extent) -> Vec<u8> {
         polygon(self.0.srs, &[[west, south], [east, south], [east, north], [west, north]])
     }
+}
+
+/// Easting, northing and height of a vertex of a load module.
+fn place_m(product: &Product, id: ModuleId, vertex: ModuleVertex) -> [f64; 3] {
+    let [east_m, north_m] = product.corner_m(id.row, id.col);
+    let [x_m, y_m] = [vertex.x, vertex.y].map(|quanta| f64::from(quanta) / f64::from(QUANTA_PER_METRE));
+    [east_m + x_m, north_m + y_m, metres_of_quanta(vertex.z)]
 }
 
 fn extent(product: &Product, rect: ModuleRect) -> Extent {

@@ -7,8 +7,11 @@ use source_files::geopackage_parts::{Extent, Layer, Package, point_z, polygons};
 use terrain::plans::union;
 use terrain::{Canopy, LoadModule, ObjectKind, Prism, QUANTA_PER_METRE, metres_of_quanta};
 
-use crate::Product;
+use crate::classes::Classes;
+use crate::gpkg_styles::Style;
 use crate::objects::canopy_plans;
+use crate::sheets::{Material, object_material};
+use crate::{Product, Sheet};
 
 const BUILDINGS: Layer = Layer {
     name: "buildings",
@@ -58,7 +61,7 @@ pub(crate) fn add_objects(
     let mut layers = Vec::new();
     let wholes = wholes(product);
     for layer in [&BUILDINGS, &WOODS, &ROWS, &POINTS] {
-        let own = || wholes.iter().filter(|((kind, _), _)| std::ptr::eq(layer_of(*kind), layer));
+        let own = || wholes.iter().filter(|((kind, _), _)| layer_of(*kind).name == layer.name);
         if own().next().is_none() {
             continue;
         }
@@ -83,6 +86,14 @@ pub(crate) fn add_objects(
         }
     }
     Ok(layers)
+}
+
+/// How a layer of objects is drawn: in the colour of the tops of its first kind.
+pub(crate) fn style_of(layer: &Layer) -> Style<'static> {
+    let own = ObjectKind::ALL.into_iter().find(|kind| layer_of(*kind).name == layer.name);
+    let class = own.map_or(0, |kind| object_material(kind, false));
+    let color = Material { sheet: Sheet::Objects, class }.color(Classes::default());
+    if layer.geometry == "POINT" { Style::Marked(color) } else { Style::Filled(color) }
 }
 
 fn layer_of(kind: ObjectKind) -> &'static Layer {

@@ -18,73 +18,97 @@ CREATE TABLE layer_styles (
 INSERT INTO gpkg_contents (table_name, data_type, identifier, description, last_change)
     VALUES ('layer_styles', 'attributes', 'layer_styles', '', '1970-01-01T00:00:00.000Z');";
 
-/// Adds the styles; `with_classes` are the layers whose features have a class, `classes` the numbers and names of
-/// these.
-pub(crate) fn add(
-    connection: &Connection,
-    with_classes: &[&str],
-    classes: &BTreeMap<u8, String>,
-) -> rusqlite::Result<()> {
+/// How a layer is drawn.
+pub(crate) enum Style<'a> {
+    /// Outlines of one colour over what lies below.
+    Outlined(&'a str),
+    /// Polygons of one colour.
+    Filled([u8; 3]),
+    /// A mark at each point.
+    Marked([u8; 3]),
+    /// Polygons by the numbers of their classes, which have these names; holes are hatched.
+    ByClass(&'a BTreeMap<u8, String>),
+    /// Lines likewise.
+    LinesByClass(&'a BTreeMap<u8, String>),
+}
+
+/// Adds the style of each layer.
+pub(crate) fn add(connection: &Connection, styles: &[(&str, Style)]) -> rusqlite::Result<()> {
     connection.execute_batch(TABLE)?;
     let mut add = connection.prepare(
         "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, f_geometry_column, styleName,
          styleQML, styleSLD, useAsDefault, description, owner) VALUES ('', '', ?1, 'geom', ?1, ?2, '', 1, '', '')",
     )?;
-    for (layer, outline) in [("load_modules", "70,70,70"), ("tiles", "0,70,160"), ("breaches", "200,40,20")] {
-        add.execute(params![layer, outlined(outline)])?;
-    }
-    for layer in with_classes {
-        add.execute(params![layer, by_class(classes)])?;
+    for (layer, style) in styles {
+        add.execute(params![layer, document(&renderer(style))])?;
     }
     Ok(())
 }
 
-/// Outlines of one colour over what lies below.
-fn outlined(color: &str) -> String {
-    document(&format!(
-        "<renderer-v2 type=\"singleSymbol\"><symbols>{}</symbols></renderer-v2>",
-        symbol("0", "no", "0,0,0,0", color)
-    ))
+fn renderer(style: &Style) -> String {
+    const THIN: &str = "60,60,60";
+    let single =
+        |symbol: String| format!("<renderer-v2 type=\"singleSymbol\"><symbols>{symbol}</symbols></renderer-v2>");
+    let opaque = |[red, green, blue]: [u8; 3]| format!("{red},{green},{blue},255");
+    match style {
+        Style::Outlined(color) => single(fill("0", "no", "0,0,0,0", color)),
+        Style::Filled(color) => single(fill("0", "solid", &opaque(*color), THIN)),
+        Style::Marked(color) => {
+            let color = opaque(*color);
+            let options = [("name", "circle"), ("color", color.as_str()), ("size", "2"), ("size_unit", "MM")];
+            single(symbol("0", ["marker", "SimpleMarker"], &options))
+        }
+        Style::ByClass(of) => by_class(of, |index, class, color| match class {
+            HOLE_CLASS => fill(index, "b_diagonal", "150,150,150,255", "150,150,150"),
+            _ => fill(index, "solid", &opaque(color), THIN),
+        }),
+        Style::LinesByClass(of) => by_class(of, |index, _, color| {
+            let color = opaque(color);
+            let options = [("line_color", color.as_str()), ("line_width", "0.6"), ("line_width_unit", "MM")];
+            symbol(index, ["line", "SimpleLine"], &options)
+        }),
+    }
 }
 
-/// Triangles filled by class, holes hatched.
-fn by_class(of: &BTreeMap<u8, String>) -> String {
+/// A symbol for each class, by its index, number and colour.
+fn by_class(of: &BTreeMap<u8, String>, symbol: impl Fn(&str, u8, [u8; 3]) -> String) -> String {
     let (mut categories, mut symbols) = (String::new(), String::new());
     for (index, (class, name)) in of.iter().enumerate() {
-        let [red, green, blue] = classes::color(name, *class);
+        symbols += &symbol(&index.to_string(), *class, classes::color(name, *class));
         let name = escaped(name);
         categories += &format!("<category render=\"true\" symbol=\"{index}\" value=\"{class}\" label=\"{name}\"/>");
-        symbols += &match *class {
-            HOLE_CLASS => symbol(&index.to_string(), "b_diagonal", "150,150,150,255", "150,150,150"),
-            _ => symbol(&index.to_string(), "solid", &format!("{red},{green},{blue},255"), "60,60,60"),
-        };
     }
-    document(&format!(
+    format!(
         "<renderer-v2 type=\"categorizedSymbol\" attr=\"class\"><categories>{categories}</categories>\
          <symbols>{symbols}</symbols></renderer-v2>"
-    ))
+    )
 }
 
 fn document(renderer: &str) -> String {
     format!("<qgis version=\"3.22.0\" styleCategories=\"Symbology\">{renderer}</qgis>")
 }
 
-fn symbol(name: &str, fill: &str, color: &str, outline: &str) -> String {
+fn fill(name: &str, style: &str, color: &str, outline: &str) -> String {
     let outline = format!("{outline},255");
     let options = [
         ("color", color),
-        ("style", fill),
+        ("style", style),
         ("outline_color", outline.as_str()),
         ("outline_style", "solid"),
         ("outline_width", "0.1"),
         ("outline_width_unit", "MM"),
     ];
+    symbol(name, ["fill", "SimpleFill"], &options)
+}
+
+/// A symbol of a kind, drawn by one layer.
+fn symbol(name: &str, [kind, layer]: [&str; 2], options: &[(&str, &str)]) -> String {
     let options: String = options
         .iter()
         .map(|(name, value)| format!("<Option type=\"QString\" name=\"{name}\" value=\"{value}\"/>"))
         .collect();
     format!(
-        "<symbol type=\"fill\" name=\"{name}\" alpha=\"1\"><layer class=\"SimpleFill\" enabled=\"1\" pass=\"0\">\
+        "<symbol type=\"{kind}\" name=\"{name}\" alpha=\"1\"><layer class=\"{layer}\" enabled=\"1\" pass=\"0\">\
          <Option type=\"Map\">{options}</Option></layer></symbol>"
     )
 }
@@ -101,7 +125,7 @@ mod tests {
     #[test]
     fn names_cannot_break_out_of_a_style_and_holes_are_hatched() {
         let classes = BTreeMap::from([(0, "a \"<b>&".to_owned()), (HOLE_CLASS, "hole".to_owned())]);
-        let style = by_class(&classes);
+        let style = renderer(&Style::ByClass(&classes));
         assert!(style.contains("label=\"a &quot;&lt;b&gt;&amp;\""), "{style}");
         assert!(style.contains("value=\"255\" label=\"hole\"") && style.contains("b_diagonal"), "{style}");
     }
