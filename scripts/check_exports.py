@@ -353,19 +353,28 @@ def check_meshes(database, arguments, scratch):
 def check_glb(database, arguments, scratch):
     glb = export(arguments, "glb", scratch / "mesh.glb")
     document, _ = read_glb(glb.read_bytes())
-    found = {"": {}, "decks_": {}}
+    found, coarser, meshes = {"": {}, "decks_": {}}, [], []
     for node in document["nodes"]:
         if "children" in node:
             expect(node["name"] == "decks" and len(node["children"]) == len(database.deck_modules), "a node of decks")
             continue
-        kind, row, col = re.fullmatch(r"(|decks_)r(\d+)c(\d+)", node["name"]).groups()
-        found[kind][int(row), int(col)] = glb_triangles(document, document["meshes"][node["mesh"]])
+        kind, row, col, level = re.fullmatch(r"(|decks_)r(\d+)c(\d+)(?:_lod(\d+))?", node["name"]).groups()
+        triangles = glb_triangles(document, document["meshes"][node["mesh"]])
+        if level:
+            ground = database.levels[int(row), int(col)][int(level)]["classes"]
+            coarser.append(kind != "" or triangles == sum(number != HOLE for number in ground))
+            continue
+        meshes.append(node["mesh"])
+        found[kind][int(row), int(col)] = triangles
+    levels = max(len(of) for of in database.levels.values())
+    expect(all(coarser) and bool(coarser) == (1 < levels), f"{len(coarser)} nodes of coarser levels, with theirs")
     expect(found[""] == database.ground_modules, f"{len(found[''])} nodes, each a load module by name and triangles")
     expect(found["decks_"] == database.deck_modules, f"{len(found['decks_'])} nodes of decks likewise")
     named = {of["name"] for of in database.report["classes"]} - {"hole"}
     materials = [of["name"].removeprefix("decks_") for of in document["materials"]]
     expect(len(named) < 2 or set(materials) <= named, f"materials have the names of classes {materials}")
-    places = {tuple(place) for positions in glb_positions(glb.read_bytes()) for place in positions}
+    positions = list(glb_positions(glb.read_bytes()))
+    places = {tuple(place) for mesh in meshes for place in positions[mesh]}
     turned = {(x, -z, y) for x, y, z in places}
     expect(turned == database.places | database.deck_places, "every vertex at its place, exactly")
     validate([glb], arguments)
@@ -533,7 +542,13 @@ def check_gpkg(database, arguments, scratch):
     area = triangles.geometry.area.sum()
     whole = database.rows * database.cols * database.side ** 2
     expect(abs(area / whole - 1) < 1e-9, f"triangles cover {area / 1e6:.3f} km2")
-    check_styles(path, set(triangles["class"]) | set(database.deck_of_class))
+    lines = {line["class"] for module in database.modules.values() for line in module.get("lines", [])}
+    if lines:
+        found = geopandas.read_file(path, layer="lines")
+        count = sum(len(module.get("lines", [])) for module in database.modules.values())
+        expect(len(found) == count and bool(found.has_z.all()), f"lines: {count}, with heights")
+        expect(set(found["class"]) == lines, f"lines: of their classes {sorted(set(found.class_name))}")
+    check_styles(path, set(triangles["class"]) | set(database.deck_of_class), lines)
     check_in_qgis(path, dict(zip(triangles["class"], triangles.class_name)), arguments)
 
 
@@ -575,7 +590,7 @@ def check_features(database, arguments, scratch):
     expect(len(layers["culverts"]) <= len(layers["remarks"]), f"{len(layers['culverts'])} culverts")
 
 
-def check_styles(path, classes):
+def check_styles(path, classes, ways):
     """What QGIS reads: a default style for each layer, its symbols and categories at their places."""
     with sqlite3.connect(path) as package:
         styles = dict(package.execute("SELECT f_table_name, styleQML FROM layer_styles WHERE useAsDefault"))
@@ -588,7 +603,7 @@ def check_styles(path, classes):
         renderer = xml.fromstring(text).find("renderer-v2")
         symbols = {symbol.get("name") for symbol in renderer.iter("symbol")}
         categories = {int(of.get("value")): of.get("symbol") for of in renderer.iter("category")}
-        wanted = classes if name in ("triangles", "decks") else set()
+        wanted = {"triangles": classes, "decks": classes, "lines": ways}.get(name, set())
         expect(set(categories) == wanted and set(categories.values() or symbols) == symbols, f"style of {name}")
 
 
@@ -630,7 +645,7 @@ def check_in_qgis(path, names, arguments):
 
 
 def check_openflight(database, arguments, scratch):
-    folder = export(arguments, "openflight", scratch / "flt")
+    folder = export(arguments, "openflight", scratch / "flt", "--lod", "0")
     squares = sorted((folder / "squares").glob("*.flt"))
     if not shutil.which("osgconv"):
         raise Skip("no osgconv")
@@ -651,10 +666,26 @@ def check_openflight(database, arguments, scratch):
     own = numpy.array(sorted(database.places | database.deck_places))
     expected = sorted(numpy.round(own.max(0) - own.min(0), 2))
     expect(numpy.allclose(extents, expected, atol=0.05), f"bounds {extents}, expected {expected}")
+    levels = max(len(of) for of in database.levels.values())
+    if 1 < levels:
+        check_flt_levels(export(arguments, "openflight", scratch / "flt_levels"), levels, scratch)
     tree = xml.parse(folder / "area.mft").getroot()
     listed = [tile.get("file") for tile in tree.iter("Tile")]
     there = all((folder / name).exists() for name in listed)
     expect(there and len(listed) == len(squares), "the index lists each file")
+
+
+def check_flt_levels(folder, levels, scratch):
+    """OSG reads a level-of-detail node for each level of each square, which take turns from near to far."""
+    ranges = []
+    for square in sorted((folder / "squares").glob("*.flt")):
+        out = scratch / "square.osgt"
+        subprocess.run(["osgconv", str(square), str(out)], capture_output=True, check=True)
+        found = re.findall(r"RangeList \d+ \{\s+([-\d.e+]+) ([-\d.e+]+)", out.read_text())
+        ranges.append([tuple(map(float, pair)) for pair in found])
+    turns = all(far == near for of in ranges for (_, far), (near, _) in zip(of, of[1:]))
+    sound = all(len(of) == levels and of[0][0] == 0 for of in ranges)
+    expect(sound and turns, f"OSG shows {levels} levels of each square, one after the other: {ranges[0]}")
 
 
 def globe(database, places):

@@ -17,10 +17,16 @@ pub struct Carries {
     pub textures: &'static str,
     /// What becomes of triangles over holes, where no source has a height.
     pub holes: &'static str,
+    /// What becomes of coarser levels.
+    pub levels: &'static str,
+    /// Where a corner lies across and along its way.
+    pub lanes: &'static str,
 }
 
 /// What a format says of what it has no room for.
 pub const LEFT_OUT: &str = "left out";
+const ONE: &str = "left out, but for the one that --lod names";
+const LAST_UVS: &str = "the last TEXCOORD";
 const GROUND_ALONE: &str = "left out: there is room for the ground alone";
 
 const MESH: Carries = Carries {
@@ -31,12 +37,16 @@ const MESH: Carries = Carries {
     objects: "meshes of their own",
     textures: LEFT_OUT,
     holes: LEFT_OUT,
+    levels: ONE,
+    lanes: LEFT_OUT,
 };
 const RASTER: Carries =
     Carries { classes: LEFT_OUT, decks: GROUND_ALONE, ribbons: GROUND_ALONE, objects: GROUND_ALONE, ..MESH };
 const TILES: Carries = Carries {
     objects: "meshes whose features have id, class and height",
-    textures: "a JPEG in each tile, coarser farther away",
+    textures: "a picture in each tile, coarser farther away",
+    levels: "tiles between a square and its load modules",
+    lanes: LAST_UVS,
     ..MESH
 };
 const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where they are";
@@ -49,8 +59,9 @@ pub const CARRIES: [Carries; 17] = [
         decks: "in the files of their load modules",
         ribbons: "middle lines in the files of their load modules",
         objects: "in the files of their load modules",
-        textures: LEFT_OUT,
         holes: "of class 255, as in the database",
+        levels: "all in the files of their load modules",
+        ..MESH
     },
     Carries {
         format: "ply",
@@ -64,19 +75,26 @@ pub const CARRIES: [Carries; 17] = [
         format: "obj",
         classes: "materials in NAME.mtl",
         objects: "an object each",
-        textures: "a JPEG beside it",
+        textures: "a picture beside it",
         ..MESH
     },
-    Carries { format: "glb", objects: "a node each, with id and height", textures: "a JPEG inside", ..MESH },
+    Carries {
+        format: "glb",
+        objects: "a node each, with id and height",
+        textures: "a picture inside",
+        levels: "nodes of MSFT_lod in place of those of load modules",
+        lanes: LAST_UVS,
+        ..MESH
+    },
     Carries { format: "geotiff", holes: "NaN in the raster", ..RASTER },
     Carries {
         format: "gpkg",
         classes: "an attribute",
         decks: "in the layer decks",
-        ribbons: "left out: --format features has the lines",
+        ribbons: "middle lines in the layer lines",
         objects: "in the layers buildings, woods, rows and points",
-        textures: LEFT_OUT,
         holes: "in the layer triangles, of class hole",
+        ..MESH
     },
     Carries {
         format: "features",
@@ -84,14 +102,17 @@ pub const CARRIES: [Carries; 17] = [
         decks: "in the layer decks",
         ribbons: "in the layer lines",
         objects: "left out: --format gpkg has them",
-        textures: LEFT_OUT,
         holes: "in none of its layers",
+        levels: "left out: they have the same features",
+        ..MESH
     },
     Carries {
         format: "openflight",
         classes: "materials and surface material codes",
         objects: "an object each, their materials from code 256 on",
-        textures: "a JPEG for each square",
+        textures: "a picture for each square",
+        levels: "level-of-detail nodes of each square, by distance",
+        lanes: "UV lists of layer 1",
         ..MESH
     },
     Carries { format: "3dtiles", ..TILES },
@@ -109,7 +130,9 @@ pub const CARRIES: [Carries; 17] = [
         format: "usd",
         classes: "subsets with materials",
         objects: "a prim each, with id and height",
-        textures: "a JPEG for each tile",
+        textures: "a picture for each tile",
+        levels: "variants of each tile, called lod",
+        lanes: "primvars:lane",
         ..MESH
     },
     Carries {
@@ -124,7 +147,7 @@ pub const CARRIES: [Carries; 17] = [
         classes: "materials in classes.mtl",
         ribbons: "meshes that are seen and not hit",
         objects: "meshes that are seen, and boxes that are hit",
-        textures: "a JPEG for each block",
+        textures: "a picture for each block",
         ..MESH
     },
 ];
@@ -132,13 +155,15 @@ pub const CARRIES: [Carries; 17] = [
 /// A column of the table: what it is called, and how it is read.
 type Column = (&'static str, fn(&Carries) -> &'static str);
 
-const COLUMNS: [Column; 6] = [
+const COLUMNS: [Column; 8] = [
     ("classes", |row| row.classes),
     ("decks of bridges", |row| row.decks),
     ("ribbons", |row| row.ribbons),
     ("objects", |row| row.objects),
     ("orthophotos", |row| row.textures),
     ("holes", |row| row.holes),
+    ("coarser levels", |row| row.levels),
+    ("places along ways", |row| row.lanes),
 ];
 
 /// The table of the guide.

@@ -1,7 +1,7 @@
 //! Classes of triangles as exports name and colour them.
 
 use store::Report;
-use terrain::named_class_color;
+use terrain::{MaterialName, named_class_color};
 
 /// Base colours of classes whose names say nothing of their colour, in order and over again: told apart by the
 /// colour-blind, too.
@@ -20,20 +20,24 @@ const COLOURS: [[f64; 3]; 8] = [
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Classes<'a> {
     names: &'a [String],
-    /// Other names for materials, by those that they would have.
-    materials: &'a [(String, String)],
+    /// Other names for materials.
+    materials: &'a [MaterialName],
 }
 
 impl<'a> Classes<'a> {
     /// Classes with these names, and with other names for some materials.
-    pub(crate) fn named(names: &'a [String], materials: &'a [(String, String)]) -> Self {
+    pub(crate) fn new(names: &'a [String], materials: &'a [MaterialName]) -> Self {
         Self { names, materials }
     }
 
-    /// The name of a material that would have this one.
-    pub(crate) fn material(self, word: String) -> String {
-        let other = self.materials.iter().find(|(of, _)| *of == word);
-        other.map_or(word, |(_, name)| as_word(name))
+    /// What else a material is called, by its own name.
+    pub(crate) fn named(self, of: &str) -> Option<&'a MaterialName> {
+        self.materials.iter().find(|named| named.of == of)
+    }
+
+    /// The name that the job gives a class; empty where it gives none.
+    pub(crate) fn own_name(self, class: u8) -> &'a str {
+        self.names.get(usize::from(class)).map_or("", String::as_str)
     }
 
     /// The name of a class, where a job has several: a single one needs none.
@@ -48,7 +52,7 @@ impl<'a> Classes<'a> {
 
     /// Red, green and blue from 0 to 255, as screens show them.
     pub(crate) fn color(self, class: u8) -> [u8; 3] {
-        color(self.names.get(usize::from(class)).map_or("", String::as_str), class)
+        color(self.own_name(class), class)
     }
 
     /// Red, green and blue from 0 to 1, as light adds up.
@@ -59,7 +63,7 @@ impl<'a> Classes<'a> {
 }
 
 /// A name as one word.
-fn as_word(name: &str) -> String {
+pub(crate) fn as_word(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
@@ -102,7 +106,7 @@ mod tests {
     #[test]
     fn a_class_has_the_colour_of_its_name_or_else_of_its_number() {
         let names = ["default", "a b\nc", "motorway", "lake"].map(str::to_owned);
-        let classes = Classes::named(&names, &[]);
+        let classes = Classes::new(&names, &[]);
         assert_eq!(classes.color(2), named_class_color("motorway").unwrap());
         assert_eq!((classes.color(0), classes.color(9)), ([140, 128, 92], [87, 107, 77]));
         assert_eq!([classes.light(0), classes.light(3)], [[0.55, 0.50, 0.36], [0.117, 0.323, 0.552]]);
@@ -112,6 +116,6 @@ mod tests {
     #[test]
     fn a_single_class_needs_no_name() {
         let names = ["default".to_owned()];
-        assert_eq!(Classes::named(&names, &[]).word(0), "class_0");
+        assert_eq!(Classes::new(&names, &[]).word(0), "class_0");
     }
 }

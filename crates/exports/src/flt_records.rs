@@ -18,12 +18,14 @@ mod opcode {
     pub const POP: u16 = 11;
     pub const COMMENT: u16 = 31;
     pub const LONG_ID: u16 = 33;
+    pub const UV_LIST: u16 = 53;
     pub const EXTERNAL: u16 = 63;
     pub const TEXTURE: u16 = 64;
     pub const VERTEX_PALETTE: u16 = 67;
     pub const VERTEX_NORMAL: u16 = 69;
     pub const VERTEX_NORMAL_UV: u16 = 70;
     pub const VERTEX_LIST: u16 = 72;
+    pub const LEVEL: u16 = 73;
     pub const MATERIAL: u16 = 113;
 }
 
@@ -60,8 +62,8 @@ pub(crate) struct Place {
 /// How a face is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Face {
-    /// The class, or what the object is made of, as surface material.
-    pub code: i16,
+    /// Surface material code, and feature identification.
+    pub codes: [i16; 2],
     /// Its place in the palette of materials.
     pub material: i16,
     pub color: [u8; 3],
@@ -187,6 +189,21 @@ impl Records {
         self.long_id(name);
     }
 
+    /// A node that is shown from one distance of a place to another, in metres.
+    pub(crate) fn level(&mut self, name: &str, [near_m, far_m]: [f64; 2], middle: [f64; 3]) {
+        const FREEZE_CENTER: u32 = 0x2000_0000;
+        self.open(opcode::LEVEL, 80);
+        self.text(name, 8);
+        self.zeros(4);
+        // Switched in when the eye comes as near as the first, out when it comes nearer than the second.
+        self.f64s(&[far_m, near_m]);
+        self.i16s(&[0, 0]);
+        self.u32s(&[FREEZE_CENTER]);
+        self.f64s(&middle);
+        // One at a time, and no size that tells.
+        self.f64s(&[0.0, 0.0]);
+    }
+
     /// The name of the node before, where it is longer than seven bytes.
     fn long_id(&mut self, name: &str) {
         if 7 < name.len() {
@@ -242,8 +259,10 @@ impl Records {
         self.zeros(4);
     }
 
-    /// A triangle over vertices of the palette, its class as surface material.
-    pub(crate) fn face(&mut self, triangle: [u32; 3], face: Face) {
+    /// A triangle over vertices of the palette; `lane` has places of its corners
+    /// across and along a way, for a texture of the first layer above that of the file.
+    pub(crate) fn face(&mut self, triangle: [u32; 3], face: Face, lane: Option<[[f32; 2]; 3]>) {
+        const FIRST_LAYER: u32 = 0x8000_0000;
         const TERRAIN_PACKED_COLOUR: u32 = 0x8000_0000 | 0x2000_0000 | 0x1000_0000;
         const FACE_COLOUR_WITH_NORMALS: u8 = 2;
         let [red, green, blue] = face.color.map(u32::from);
@@ -251,8 +270,9 @@ impl Records {
         self.zeros(8 + 4 + 2);
         self.put(&[u8::from(face.is_seen_from_below), 0]);
         self.zeros(4 + 2);
-        // No texture of details; the class as surface material code; no feature.
-        self.i16s(&[-1, i16::from(face.has_texture) - 1, face.material, face.code, 0]);
+        let [surface, feature] = face.codes;
+        // No texture of details.
+        self.i16s(&[-1, i16::from(face.has_texture) - 1, face.material, surface, feature]);
         self.zeros(4 + 2 + 2);
         self.u32s(&[TERRAIN_PACKED_COLOUR]);
         self.put(&[FACE_COLOUR_WITH_NORMALS]);
@@ -265,6 +285,11 @@ impl Records {
         self.open(opcode::VERTEX_LIST, 16);
         let bytes = self.vertex_bytes();
         self.u32s(&triangle.map(|v| (PALETTE_BYTES + v as usize * bytes) as u32));
+        if let Some(places) = lane {
+            self.open(opcode::UV_LIST, 32);
+            self.u32s(&[FIRST_LAYER]);
+            places.as_flattened().iter().for_each(|part| self.put(&part.to_be_bytes()));
+        }
         self.pop();
     }
 
@@ -307,8 +332,9 @@ mod tests {
         all.push();
         all.group("a");
         all.object("r0001c0002");
-        let face = Face { code: 3, material: 0, color: [1, 2, 3], is_seen_from_below: true, has_texture: false };
-        all.face([0, 1, 2], face);
+        let face = Face { codes: [3, 0], material: 0, color: [1, 2, 3], is_seen_from_below: true, has_texture: false };
+        all.level("lod1", [2000.0, 9000.0], [500.0, 250.0, 1000.0]);
+        all.face([0, 1, 2], face, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 7.0]]));
         all.external("squares/r00c00.flt");
         all.pop();
         let expected = [
@@ -323,9 +349,11 @@ mod tests {
             (2, 44),
             (4, 28),
             (33, 16),
+            (73, 80),
             (5, 80),
             (10, 4),
             (72, 16),
+            (53, 32),
             (11, 4),
             (63, 216),
             (11, 4),
@@ -340,7 +368,8 @@ mod tests {
         all.vertices(&[FltVertex { place: [0.0; 3], normal: [0.0, 0.0, 1.0], uv: Some([0.25, 0.5]) }; 3]);
         all.face(
             [0, 1, 2],
-            Face { code: 3, material: 0, color: [255; 3], is_seen_from_below: false, has_texture: true },
+            Face { codes: [3, 0], material: 0, color: [255; 3], is_seen_from_below: false, has_texture: true },
+            None,
         );
         let found = records(&all.bytes);
         assert_eq!(found[..5], [(64, 216), (67, 8), (70, 64), (70, 64), (70, 64)]);

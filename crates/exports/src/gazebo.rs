@@ -52,9 +52,10 @@ pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), Exp
             }
         }
         if let Some(texture) = texture.filter(|_| block.is_solid || block.is_seen) {
-            let text = obj_materials(product, &mesh, Some(&format!("{name}.jpg"))).unwrap_or_default();
+            let photo = format!("{name}.{}", product.texture_extension());
+            let text = obj_materials(product, &mesh, Some(&photo)).unwrap_or_default();
             put(&format!("meshes/{name}.mtl"), text.as_bytes())?;
-            put(&format!("meshes/{name}.jpg"), &texture.jpeg)?;
+            put(&format!("meshes/{photo}"), &texture.bytes)?;
         }
         Ok(Some(block).filter(|block| block.is_solid || block.is_seen))
     })?;
@@ -132,7 +133,7 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
     let [longitude, latitude] = Earth::new(product, Some(Datum::Ellipsoid))?.lon_lat(place_m)?;
     let name = escaped(&product.manifest.area.name);
     let mut text = format!(
-        "<?xml version=\"1.0\"?>\n<!-- tiefort: x east, y north of {} {} in {}, z up above {}; metres -->\n\
+        "<?xml version=\"1.0\"?>\n<!-- tiefort: x east, y north of {} {} in {}, z up above {}; metres{} -->\n\
          <sdf version=\"1.9\">\n  <world name=\"{name}\">\n",
         place_m[0],
         place_m[1],
@@ -141,6 +142,7 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
             "" => "an unknown vertical datum".into(),
             datum => escaped(datum),
         },
+        thanks(product),
     );
     for (file, system) in [
         ("gz-sim-physics-system", "Physics"),
@@ -173,6 +175,12 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
     }
     text.push_str("    </plugin>\n  </world>\n</sdf>\n");
     Ok(text)
+}
+
+/// Whom to thank for the sources, as part of a comment, which must not end there.
+fn thanks(product: &Product) -> String {
+    let thank = |text: &&str| format!("; source {}", text.replace("--", "- - "));
+    product.attributions().iter().map(thank).collect()
 }
 
 fn put_model(text: &mut String, product: &Product, block: &Block) {

@@ -9,12 +9,13 @@ use serde_json::{Value, json};
 use terrain::{ModuleId, Tin, metres_of_quanta};
 
 use crate::classes::Classes;
+use crate::detail::{Detail, coverage, steps};
 use crate::glb_features::FoundFeatures;
 use crate::mesh::{Part, class_groups, normals};
 use crate::modules::{alone, sheet_name};
 use crate::objects::Thing;
 use crate::sheets::Material;
-use crate::{Facts, Mesh, Product, Sheet, Texture, TinPlace};
+use crate::{Facts, Mesh, Product, Sheet, Texture, TextureFile, TinPlace};
 
 /// Meshes as they go into a glTF, each in a node of its own.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +24,8 @@ pub(crate) struct Gltf<'a> {
     pub sheets: Vec<(Sheet, Vec<GltfNode>)>,
     /// What materials are called, and their colours.
     pub classes: Classes<'a>,
+    /// Whom to thank for the sources.
+    pub thanks: String,
     /// What else to tell a reader.
     pub extras: Value,
     /// What all that has places in it is seen with.
@@ -40,12 +43,18 @@ pub(crate) struct GltfNode {
     pub normals: Vec<[f32; 3]>,
     /// Places in the texture, where there is one.
     pub uvs: Vec<[f32; 2]>,
+    /// Places across and along ways, where there are any.
+    pub lanes: Vec<[f32; 2]>,
     /// Triangles of each class of ground, in order.
     pub groups: Vec<(u8, Vec<[u32; 3]>)>,
     /// What else to tell a reader.
     pub extras: Value,
     /// What of it a click finds, where that is told.
     pub features: Option<FoundFeatures>,
+    /// The same at coarser levels, from fine to coarse.
+    pub coarser: Vec<GltfNode>,
+    /// The share of a picture from which on a coarser one will do.
+    pub coverage: f64,
 }
 
 /// Turns east, north, up into glTF's axes.
@@ -113,9 +122,9 @@ impl Parts {
             let numbers: Vec<f32> = features.of_vertices.iter().map(|&number| number as f32).collect();
             attributes["_FEATURE_ID_0"] = json!(self.floats(Self::FEATURES, &numbers, "SCALAR", numbers.len()));
         }
-        if !node.uvs.is_empty() {
-            let uvs = node.uvs.as_flattened();
-            attributes["TEXCOORD_0"] = json!(self.floats(Self::UVS, uvs, "VEC2", node.uvs.len()));
+        for (number, uvs) in [&node.uvs, &node.lanes].into_iter().filter(|uvs| !uvs.is_empty()).enumerate() {
+            let places = self.floats(Self::UVS, uvs.as_flattened(), "VEC2", uvs.len());
+            attributes[format!("TEXCOORD_{number}")] = json!(places);
         }
         let mut primitives = Vec::with_capacity(node.groups.len());
         for (class, triangles) in &node.groups {
@@ -184,12 +193,25 @@ impl Parts {
         self.nodes.extend(parents);
         top
     }
+
+    /// Adds the coarser levels of node `of`, which stand in no scene: they take its place.
+    fn add_coarser(&mut self, of: usize, node: &GltfNode, sheet: Sheet, materials: &[Material]) {
+        let first = self.nodes.len();
+        node.coarser.iter().for_each(|coarser| self.add(coarser, sheet, materials));
+        let levels = std::iter::once(node).chain(&node.coarser);
+        let coverage: Vec<f64> = levels.map(|level| level.coverage).collect();
+        self.nodes[of]["extensions"] = json!({ "MSFT_lod": { "ids": (first..self.nodes.len()).collect::<Vec<_>>() } });
+        self.nodes[of]["extras"]["MSFT_screencoverage"] = json!(coverage);
+    }
 }
 
 impl Gltf<'_> {
     /// The bytes of the binary file.
     pub(crate) fn bytes(&self) -> Vec<u8> {
         let mut asset = json!({ "version": "2.0", "generator": "tiefort" });
+        if !self.thanks.is_empty() {
+            asset["copyright"] = json!(self.thanks);
+        }
         if !self.extras.is_null() {
             asset["extras"] = self.extras.clone();
         }
@@ -199,7 +221,8 @@ impl Gltf<'_> {
         }
         let all = || self.sheets.iter().flat_map(|(sheet, nodes)| nodes.iter().map(|node| (*sheet, node)));
         let used = |(sheet, node): (Sheet, &GltfNode)| -> Vec<Material> {
-            node.groups.iter().map(|&(class, _)| Material { sheet, class }.by_sides()).collect()
+            let groups = std::iter::once(node).chain(&node.coarser).flat_map(|level| &level.groups);
+            groups.map(|&(class, _)| Material { sheet, class }.by_sides()).collect()
         };
         let mut materials: Vec<Material> = all().flat_map(used).collect();
         materials.sort_unstable();
@@ -207,6 +230,8 @@ impl Gltf<'_> {
         let mut parts = Parts::default();
         all().for_each(|(sheet, node)| parts.add(node, sheet, &materials));
         let top = parts.put_parents(&self.sheets);
+        let with_levels = || all().enumerate().filter(|(_, (_, node))| !node.coarser.is_empty());
+        with_levels().for_each(|(of, (sheet, node))| parts.add_coarser(of, node, sheet, &materials));
         let (mut views, mut binary) = parts.put_views();
         let material = |of: Material| material_of(self.classes, of, self.texture.is_some());
         let mut document = json!({
@@ -215,6 +240,9 @@ impl Gltf<'_> {
             "materials": materials.into_iter().map(material).collect::<Vec<_>>(),
             "accessors": parts.accessors,
         });
+        if with_levels().next().is_some() {
+            document["extensionsUsed"] = json!(["MSFT_lod"]);
+        }
         if let Some(features) = all().find_map(|(_, node)| node.features.as_ref()) {
             document["extensionsUsed"] = json!(["EXT_mesh_features", "EXT_structural_metadata"]);
             document["extensions"] = json!({ "EXT_structural_metadata": features.metadata(&mut views, &mut binary) });
@@ -233,10 +261,11 @@ fn put_texture(document: &mut Value, views: &mut Vec<Value>, binary: &mut Vec<u8
     const CLAMPED: u32 = 33071;
     const LINEAR: u32 = 9729;
     const LINEAR_BETWEEN_LINEAR: u32 = 9987;
-    let view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": texture.jpeg.len() });
-    binary.extend_from_slice(&texture.jpeg);
+    let view = json!({ "buffer": 0, "byteOffset": binary.len(), "byteLength": texture.bytes.len() });
+    binary.extend_from_slice(&texture.bytes);
     pad(binary, 0);
-    document["images"] = json!([{ "bufferView": views.len(), "mimeType": "image/jpeg" }]);
+    let kind = if texture.file == TextureFile::Png { "image/png" } else { "image/jpeg" };
+    document["images"] = json!([{ "bufferView": views.len(), "mimeType": kind }]);
     document["samplers"] = json!([{
         "magFilter": LINEAR, "minFilter": LINEAR_BETWEEN_LINEAR, "wrapS": CLAMPED, "wrapT": CLAMPED,
     }]);
@@ -309,38 +338,52 @@ pub(crate) fn container(document: &Value, binary: &[u8]) -> Vec<u8> {
     file
 }
 
-/// Writes `mesh` as binary glTF, counted from the south-west corner of what is exported: a node for each load module,
-/// over vertices of its own, one for its decks and ribbons below nodes `decks` and `ribbons`, and one for each
-/// object below a node `objects`.
-/// Normals are those of the whole mesh, so that no line shows between two.
+/// Writes `mesh`, that of a product, as binary glTF, counted from the south-west corner of what is exported: a node for
+/// each load module, over vertices of its own, one for its decks and ribbons below nodes `decks` and `ribbons`, and one
+/// for each object below a node `objects`.
+/// Normals are those of the whole mesh, so that no line shows between two. Coarser levels of load modules are nodes
+/// that `MSFT_lod` puts in their places; readers that do not know it show the finest.
 ///
 /// # Errors
 /// Those of `out`.
 pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh, texture: Option<Texture>) -> Result<()> {
     let facts = Facts::y_up(product);
-    let positions: Vec<[f32; 3]> = mesh.metres().map(turned).collect();
-    let normals: Vec<[f32; 3]> = mesh.normals().into_iter().map(turned).collect();
-    let node = |name: String, (sheet, extras): (Sheet, Value), part: &Part| {
-        let uvs = texture.as_ref().filter(|_| sheet != Sheet::Objects).map(|texture| mesh.uvs(texture, &part.vertices));
+    let details = Detail::all(product, mesh.clone());
+    let node = |of: &Detail, name: String, sheet: Sheet, part: &Part| {
+        let uvs = texture.as_ref().filter(|_| sheet != Sheet::Objects).map(|photo| of.mesh.uvs(photo, &part.vertices));
+        let metres = |&v: &u32| turned(of.mesh.vertices[v as usize].map(metres_of_quanta));
         let node = GltfNode {
             name,
-            positions: part.vertices.iter().map(|&v| positions[v as usize]).collect(),
-            normals: part.vertices.iter().map(|&v| normals[v as usize]).collect(),
+            positions: part.vertices.iter().map(metres).collect(),
+            normals: part.vertices.iter().map(|&v| turned(of.normals[v as usize])).collect(),
             uvs: uvs.unwrap_or_default(),
-            extras,
+            lanes: part.lanes.clone(),
             ..GltfNode::default()
         };
         node.with_groups(&part.triangles, &part.classes)
     };
     let of_module = |sheet: Sheet, id: ModuleId| {
-        node(sheet_name(sheet, alone(id)), (sheet, Value::Null), &mesh.part(product, sheet, alone(id)))
+        let (rect, name) = (alone(id), sheet_name(sheet, alone(id)));
+        let steps = steps(details.iter().map(|of| &of.product), rect);
+        let coverage = |at: usize| steps.get(at + 1).map_or(0.0, |next| coverage(product.side_m(), next.near_m));
+        let level = |(at, of): (usize, &Detail)| {
+            let name = if at == 0 { name.clone() } else { format!("{name}_lod{}", of.product.level) };
+            let node = node(of, name, sheet, &of.mesh.part(&of.product, sheet, rect));
+            GltfNode { coverage: coverage(at), ..node }
+        };
+        let mut levels = details.iter().enumerate().map(level);
+        let finest = levels.next().unwrap_or_default();
+        GltfNode { coarser: levels.filter(|node| !node.groups.is_empty()).collect(), ..finest }
     };
     let of_modules = |sheet: Sheet| -> Vec<GltfNode> {
         let all = product.rect.iter().map(|id| of_module(sheet, id));
         all.filter(|node| !node.groups.is_empty()).collect()
     };
-    let of_thing = |(thing, part): (Thing, Part)| node(thing.name(), (Sheet::Objects, thing.told()), &part);
-    let things = mesh.part(product, Sheet::Objects, product.rect).by_thing();
+    let things = details[0].mesh.part(product, Sheet::Objects, product.rect).by_thing();
+    let of_thing = |(thing, part): (Thing, Part)| GltfNode {
+        extras: thing.told(),
+        ..node(&details[0], thing.name(), Sheet::Objects, &part)
+    };
     let sheets = vec![
         (Sheet::Ground, of_modules(Sheet::Ground)),
         (Sheet::Decks, of_modules(Sheet::Decks)),
@@ -350,6 +393,7 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh, texture: 
     let gltf = Gltf {
         sheets,
         classes: product.classes(),
+        thanks: product.attributions().join("; "),
         extras: json!({
             "crs": product.crs(), "vertical_datum": product.vertical_datum(), "offset_m": facts.offset_m,
             "axes": facts.axes, "attribution": product.attributions(),
@@ -389,7 +433,7 @@ pub fn write_tin_glb(out: &mut impl Write, tin: &Tin, place: &TinPlace) -> Resul
             "crs": place.crs, "axes": "x east, y up, z south",
             "offset_m": [place.origin_m[0] + south_west[0], place.origin_m[1] + south_west[1], 0.0],
         }),
-        texture: None,
+        ..Gltf::default()
     };
     out.write_all(&gltf.bytes())
 }

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, ModuleVertex, ObjectKind, QUANTA_PER_METRE};
 
+use crate::lanes::Lanes;
 use crate::objects::{Facet, Thing, things_in};
 use crate::ribbons::Ribbons;
 use crate::{Product, Sheet, Texture};
@@ -33,6 +34,8 @@ pub struct Mesh {
     starts: [Vec<usize>; Sheet::ALL.len()],
     /// Objects with their triangles, in the order of these.
     things: Vec<(Thing, Range<usize>)>,
+    /// Triangles that are part of a way, where that is asked for: which way, and the places of their corners on it.
+    lanes: HashMap<usize, (u32, [[f32; 2]; 3])>,
 }
 
 /// Some load modules of a sheet of a mesh, over vertices of their own.
@@ -48,12 +51,20 @@ pub(crate) struct Part {
     pub modules: Vec<(ModuleId, Range<usize>)>,
     /// Each object, or piece of one, and its triangles among those of the part.
     pub things: Vec<(Thing, Range<usize>)>,
+    /// Where vertices lie across and along their ways; empty where none is part of one.
+    pub lanes: Vec<[f32; 2]>,
 }
 
 /// An object, and the triangles of its pieces.
 type Pieces = (Thing, Vec<Range<usize>>);
 
 impl Part {
+    /// Where the corners of a triangle of the part lie across and along their way, where it is part of one.
+    pub(crate) fn lane(&self, triangle: [u32; 3]) -> Option<[[f32; 2]; 3]> {
+        let places = triangle.map(|v| self.lanes.get(v as usize).copied().unwrap_or_default());
+        places.iter().any(|place| *place != [0.0; 2]).then_some(places)
+    }
+
     /// Each object of a part of objects with all of its pieces, over vertices of its own, by kind and number.
     pub(crate) fn by_thing(&self) -> Vec<(Thing, Self)> {
         let mut pieces: BTreeMap<(ObjectKind, u64), Pieces> = BTreeMap::new();
@@ -185,6 +196,19 @@ impl Mesh {
         self
     }
 
+    /// The same with places along ways, for formats that have room for them.
+    pub(crate) fn with_lanes(mut self, product: &Product) -> Self {
+        let Some(lanes) = Lanes::of(product) else { return self };
+        let ranges = [Sheet::Ground, Sheet::Decks, Sheet::Ribbons].map(|sheet| self.sheet(sheet));
+        for index in ranges.into_iter().flatten() {
+            let (class, corners) = (self.classes[index], self.triangles[index].map(|v| self.vertices[v as usize]));
+            if let Some(way) = lanes.way_of(class, corners) {
+                self.lanes.insert(index, (way, corners.map(|corner| lanes.place(class, way, corner))));
+            }
+        }
+        self
+    }
+
     /// Adds a facet: what rounding leaves without an area has no triangle.
     fn add_facet(&mut self, facet: &Facet) {
         let mut shared = HashMap::new();
@@ -243,9 +267,13 @@ impl Mesh {
                 part.things.extend(things.map(|(thing, range)| (*thing, moved(range.start)..moved(range.end))));
             }
             for index in own.filter(|&index| sheet == Sheet::Objects || self.classes[index] != HOLE_CLASS) {
-                let placed = self.triangles[index].map(|v| {
-                    *place_of.entry(v).or_insert_with(|| {
+                let lane = if sheet == Sheet::Objects { None } else { self.lanes.get(&index) };
+                let placed = [0, 1, 2].map(|corner| {
+                    let v = self.triangles[index][corner];
+                    // Ways that meet have other places at one vertex.
+                    *place_of.entry((v, lane.map(|(way, _)| way))).or_insert_with(|| {
                         part.vertices.push(v);
+                        part.lanes.push(lane.map_or([0.0; 2], |(_, places)| places[corner]));
                         part.vertices.len() as u32 - 1
                     })
                 });
@@ -253,6 +281,9 @@ impl Mesh {
                 part.classes.push(self.classes[index]);
             }
             part.modules.push((id, start..part.triangles.len()));
+        }
+        if place_of.keys().all(|(_, way)| way.is_none()) {
+            part.lanes.clear();
         }
         part
     }

@@ -2,75 +2,53 @@
 //!
 //! All files count from one origin, the south-west corner of what is exported, and say in their headers where it lies;
 //! so they fit together as they are. Triangles over holes are left out; decks and objects are groups of their own
-//! in their square.
+//! in their square. Where load modules have coarser levels, a square has a level-of-detail node for each, which
+//! programs show by their distance. Places across and along ways are lists of the first layer above the texture.
 
 use std::ops::Range;
 
-use terrain::{ModuleId, ModuleRect};
+use terrain::{ModuleId, ModuleRect, metres_of_quanta};
 
+use crate::detail::{Detail, steps};
 use crate::earth::Earth;
 use crate::flt_records::{Face, FltVertex, Place, Records};
 use crate::mesh::{Mesh, Part};
 use crate::metaflight::{Grid, metaflight};
 use crate::modules::{alone, sheet_name};
 use crate::sheets::Material;
-use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Sheet, Work};
+use crate::{Coordinates, Datum, ExportError, Facts, Product, Put, Sheet, Texture, Work};
 
 /// Side of a square in metres.
 pub(crate) const SQUARE_M: f64 = 4000.0;
+/// The distance up to which the coarsest level is shown, in metres: farther than any horizon.
+const FAR_M: f64 = 1e7;
 
 /// Writes `squares/*.flt`, `area.flt` and `area.mft`.
 ///
 /// # Errors
 /// When a file cannot be written, the area's system cannot be computed, or the work was asked to stop.
 pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
-    let mesh = Mesh::of(product);
-    let normals = mesh.normals();
-    let places: Vec<[f64; 3]> = mesh.metres().collect();
+    let details = Detail::all(product, Mesh::of(product));
     let squares = product.squares(square_side(product));
     // Longitudes and latitudes only.
     let earth = Earth::new(product, Some(Datum::Ellipsoid))?;
     let about = Facts::z_up(product, Coordinates::Local).comments(product).join("\n");
     work.each("squares", &squares, |&rect| {
-        let mut parts = mesh.parts(product, rect);
-        if parts.first().is_none_or(|(sheet, _)| *sheet != Sheet::Ground) {
-            // The group of the ground is there in any case, with an object for each load module.
-            parts.insert(0, (Sheet::Ground, mesh.part(product, Sheet::Ground, rect)));
-        }
         let mut records = Records::default();
         records.header(&place(product, &earth, rect)?);
         records.comment(&about);
         let texture = product.texture(rect, 0.0)?;
+        let texture_name = square_name(product, rect, product.texture_extension());
         if texture.is_some() {
             // Beside this file.
-            records.texture(&square_name(product, rect, "jpg"));
+            records.texture(&texture_name);
         }
-        let materials = mesh.groups();
-        for (index, material) in materials.iter().enumerate() {
-            records.material(index as i32, &material.word(product.classes()));
-        }
-        let all: Vec<u32> = parts.iter().flat_map(|(_, part)| &part.vertices).copied().collect();
-        let uvs = texture.as_ref().map(|texture| mesh.uvs(texture, &all));
-        let vertex = |(at, &v): (usize, &u32)| FltVertex {
-            place: places[v as usize],
-            normal: normals[v as usize],
-            uv: uvs.as_ref().map(|uvs| [uvs[at][0], 1.0 - uvs[at][1]]),
-        };
-        records.vertices(&all.iter().enumerate().map(vertex).collect::<Vec<_>>());
-        records.push();
-        let mut first = 0;
-        for (sheet, part) in &parts {
-            records.group(if *sheet == Sheet::Ground { "square" } else { sheet.name() });
-            let has_texture = texture.is_some() && *sheet != Sheet::Objects;
-            put_objects(&mut records, (product, &materials, has_texture), (*sheet, part), first);
-            first += part.vertices.len() as u32;
-        }
-        records.pop();
+        put_square(&mut records, &details, rect, texture.as_ref());
         let name = format!("squares/{}", square_name(product, rect, "flt"));
         put(&name, &records.into_bytes()).map_err(ExportError::write(&name))?;
         let Some(texture) = texture else { return Ok(()) };
-        let name = format!("squares/{}", square_name(product, rect, "jpg"));
-        put(&name, &texture.jpeg).map_err(ExportError::write(&name))
+        let name = format!("squares/{texture_name}");
+        put(&name, &texture.bytes).map_err(ExportError::write(&name))
     })?;
     let mut records = Records::default();
     records.header(&place(product, &earth, product.rect)?);
@@ -88,10 +66,72 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
     put("area.mft", index.as_bytes()).map_err(ExportError::write("area.mft"))
 }
 
+/// Palettes and nodes of a square: a node for each level where there are several, in it one for each sheet.
+fn put_square(records: &mut Records, details: &[Detail], rect: ModuleRect, texture: Option<&Texture>) {
+    let mut materials: Vec<Material> = details.iter().flat_map(|detail| detail.mesh.groups()).collect();
+    materials.sort_unstable();
+    materials.dedup();
+    for (index, material) in materials.iter().enumerate() {
+        records.material(index as i32, &material.word(details[0].product.classes()));
+    }
+    let levels: Vec<Vec<(Sheet, Part)>> = details.iter().map(|detail| sheets(detail, rect)).collect();
+    let of_level = |(detail, parts): (&Detail, &Vec<(Sheet, Part)>)| -> Vec<FltVertex> {
+        let all: Vec<u32> = parts.iter().flat_map(|(_, part)| &part.vertices).copied().collect();
+        let uvs = texture.map(|texture| detail.mesh.uvs(texture, &all));
+        let vertex = |(at, &v): (usize, &u32)| FltVertex {
+            place: detail.mesh.vertices[v as usize].map(metres_of_quanta),
+            normal: detail.normals[v as usize],
+            uv: uvs.as_ref().map(|uvs| [uvs[at][0], 1.0 - uvs[at][1]]),
+        };
+        all.iter().enumerate().map(vertex).collect()
+    };
+    let vertices: Vec<FltVertex> = details.iter().zip(&levels).flat_map(of_level).collect();
+    records.vertices(&vertices);
+    let steps = steps(details.iter().map(|detail| &detail.product), rect);
+    let middle = middle(&vertices);
+    records.push();
+    let mut first = 0;
+    for (index, (detail, parts)) in details.iter().zip(&levels).enumerate() {
+        if 1 < details.len() {
+            let far_m = steps.get(index + 1).map_or(FAR_M, |next| next.near_m);
+            records.level(&format!("lod{}", steps[index].level), [steps[index].near_m, far_m], middle);
+            records.push();
+        }
+        for (sheet, part) in parts {
+            records.group(if *sheet == Sheet::Ground { "square" } else { sheet.name() });
+            let has_texture = texture.is_some() && *sheet != Sheet::Objects;
+            put_objects(records, (detail, &materials, has_texture), (*sheet, part), first);
+            first += part.vertices.len() as u32;
+        }
+        if 1 < details.len() {
+            records.pop();
+        }
+    }
+    records.pop();
+}
+
+/// What a level has in a square: the group of the ground is there in any case, with an object for each load module.
+fn sheets(detail: &Detail, rect: ModuleRect) -> Vec<(Sheet, Part)> {
+    let mut parts = detail.mesh.parts(&detail.product, rect);
+    if parts.first().is_none_or(|(sheet, _)| *sheet != Sheet::Ground) {
+        parts.insert(0, (Sheet::Ground, detail.mesh.part(&detail.product, Sheet::Ground, rect)));
+    }
+    parts
+}
+
+/// The middle of the box around vertices.
+fn middle(vertices: &[FltVertex]) -> [f64; 3] {
+    let ends = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let (low, high) = vertices.iter().fold(ends, |(low, high), FltVertex { place, .. }| {
+        ([0, 1, 2].map(|axis| low[axis].min(place[axis])), [0, 1, 2].map(|axis| high[axis].max(place[axis])))
+    });
+    if vertices.is_empty() { [0.0; 3] } else { [0, 1, 2].map(|axis| f64::midpoint(low[axis], high[axis])) }
+}
+
 /// The faces of each load module of a sheet, or of each object, as an object; its vertices begin at `first`.
 fn put_objects(
     records: &mut Records,
-    (product, materials, has_texture): (&Product, &[Material], bool),
+    (detail, materials, has_texture): (&Detail, &[Material], bool),
     (sheet, part): (Sheet, &Part),
     first: u32,
 ) {
@@ -110,11 +150,11 @@ fn put_objects(
         for (triangle, &class) in part.triangles[range.clone()].iter().zip(&part.classes[range]) {
             let material = Material { sheet, class };
             // A texture is seen in its own colours.
-            let color = if has_texture { [255; 3] } else { material.color(product.classes()) };
-            let code = material.number();
+            let color = if has_texture { [255; 3] } else { material.color(detail.product.classes()) };
+            let codes = material.codes(detail.product.classes());
             let material = materials.iter().position(|of| *of == material).map_or(-1, |place| place as i16);
-            let face = Face { code, material, color, is_seen_from_below: sheet.is_seen_from_below(), has_texture };
-            records.face(triangle.map(|v| first + v), face);
+            let face = Face { codes, material, color, is_seen_from_below: sheet.is_seen_from_below(), has_texture };
+            records.face(triangle.map(|v| first + v), face, part.lane(*triangle));
         }
         records.pop();
     }

@@ -5,11 +5,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use store::{Folder, Manifest, TileModules};
-use terrain::{GridFrame, HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleLine, ModuleRect, TileId};
+use terrain::{
+    GridFrame, HOLE_CLASS, LoadModule, MaterialName, ModuleGrid, ModuleId, ModuleLine, ModuleRect, OBJECT_MATERIALS,
+    TileId,
+};
 
 use crate::classes::{Classes, names_in, water_in};
 use crate::ribbon_lines::length_m;
-use crate::sheets::object_material_names;
 use crate::textures::{Place, Texture, Textures};
 use crate::{ExportError, Work};
 
@@ -56,8 +58,8 @@ pub struct Product {
     pub lines: Vec<Vec<ModuleLine>>,
     /// Whether ways that are lines in the ground are seen as bands over it.
     pub has_ribbons: bool,
-    /// Other names for materials, by those that they would have.
-    pub(crate) materials: Vec<(String, String)>,
+    /// Other names for materials.
+    pub(crate) materials: Vec<MaterialName>,
     /// Orthophotos that the ground is seen with.
     pub textures: Option<Arc<Textures>>,
     /// The tile of each of them.
@@ -211,20 +213,22 @@ impl Product {
         self.textures.as_ref().map(|textures| textures.of(&place, texel_m)).transpose()
     }
 
-    /// Gives materials other names, each by the one that it would have.
+    /// What names of textures end in.
+    pub(crate) fn texture_extension(&self) -> &'static str {
+        self.textures.as_ref().map_or("", |textures| textures.extension())
+    }
+
+    /// Gives materials other names.
     ///
     /// # Errors
     /// When no material has one of these names.
-    pub fn name_materials(&mut self, materials: Vec<(String, String)>) -> Result<(), ExportError> {
-        let known: Vec<String> = (0..self.class_names.len().clamp(1, 255) as u8)
-            .map(|class| self.classes().word(class))
-            .chain(object_material_names().map(str::to_owned))
-            .collect();
-        if let Some((unknown, _)) = materials.iter().find(|(word, _)| !known.contains(word)) {
+    pub fn name_materials(&mut self, materials: Vec<MaterialName>) -> Result<(), ExportError> {
+        let known = || self.class_names.iter().map(String::as_str).chain(OBJECT_MATERIALS);
+        if let Some(unknown) = materials.iter().find(|named| known().all(|name| name != named.of)) {
             return Err(ExportError::Impossible {
                 what: "--material".into(),
-                found: format!("{unknown:?}"),
-                expected: format!("one of {}", known.join(", ")),
+                found: format!("{:?}", unknown.of),
+                expected: format!("one of {}", known().collect::<Vec<_>>().join(", ")),
                 hint: "write --material CLASS=NAME, once for each material that is called otherwise".into(),
             });
         }
@@ -234,7 +238,7 @@ impl Product {
 
     /// The classes of the job, by name and colour.
     pub(crate) fn classes(&self) -> Classes<'_> {
-        Classes::named(&self.class_names, &self.materials)
+        Classes::new(&self.class_names, &self.materials)
     }
 
     /// The coordinate system as the database names it.

@@ -1,8 +1,8 @@
 //! What an exported mesh consists of, and how the materials of each are called and coloured.
 
-use terrain::ObjectKind;
+use terrain::{MaterialName, OBJECT_MATERIALS, ObjectKind};
 
-use crate::classes::{Classes, linear};
+use crate::classes::{Classes, as_word, linear};
 
 /// One of the meshes that an export shows, each with vertices of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -37,28 +37,23 @@ impl Sheet {
     }
 }
 
-/// Materials of objects by number: two for each kind, for its top and its sides, in the order of kinds.
-const OBJECT_MATERIALS: [(&str, [u8; 3]); 2 * ObjectKind::ALL.len()] = [
-    ("building_roof", [150, 92, 74]),
-    ("building_wall", [214, 204, 186]),
-    ("tower_roof", [128, 128, 132]),
-    ("tower_wall", [168, 168, 170]),
-    ("wall_top", [150, 144, 132]),
-    ("wall_side", [164, 156, 142]),
-    ("wood_top", [62, 92, 52]),
-    ("wood_side", [54, 80, 46]),
-    ("scrub_top", [104, 118, 66]),
-    ("scrub_side", [94, 106, 60]),
-    ("orchard_top", [120, 140, 80]),
-    ("orchard_side", [108, 126, 72]),
-    ("row_top", [72, 104, 56]),
-    ("row_side", [64, 92, 50]),
+/// Colours of the materials of objects, by number.
+const OBJECT_COLORS: [[u8; 3]; OBJECT_MATERIALS.len()] = [
+    [150, 92, 74],
+    [214, 204, 186],
+    [128, 128, 132],
+    [168, 168, 170],
+    [150, 144, 132],
+    [164, 156, 142],
+    [62, 92, 52],
+    [54, 80, 46],
+    [104, 118, 66],
+    [94, 106, 60],
+    [120, 140, 80],
+    [108, 126, 72],
+    [72, 104, 56],
+    [64, 92, 50],
 ];
-
-/// The names of all materials that objects may have.
-pub(crate) fn object_material_names() -> impl Iterator<Item = &'static str> {
-    OBJECT_MATERIALS.iter().map(|(name, _)| *name)
-}
 
 /// The number of an object's material.
 pub(crate) const fn object_material(kind: ObjectKind, is_side: bool) -> u8 {
@@ -75,16 +70,32 @@ pub(crate) struct Material {
 impl Material {
     /// Its name as one word.
     pub(crate) fn word(self, classes: Classes) -> String {
-        classes.material(match self.sheet {
-            Sheet::Objects => OBJECT_MATERIALS[usize::from(self.class)].0.to_owned(),
+        let named = classes.named(self.of(classes)).map(|named| as_word(&named.name));
+        named.unwrap_or_else(|| match self.sheet {
+            Sheet::Objects => OBJECT_MATERIALS[usize::from(self.class)].to_owned(),
             Sheet::Ground | Sheet::Decks | Sheet::Ribbons => classes.word(self.class),
         })
+    }
+
+    /// What a job calls it: the name of the class, or of the material of objects.
+    fn of<'a>(self, classes: Classes<'a>) -> &'a str {
+        match self.sheet {
+            Sheet::Objects => OBJECT_MATERIALS[usize::from(self.class)],
+            Sheet::Ground | Sheet::Decks | Sheet::Ribbons => classes.own_name(self.class),
+        }
+    }
+
+    /// Its surface material code and its feature identification: the job's, else [`Material::number`] and 0.
+    pub(crate) fn codes(self, classes: Classes) -> [i16; 2] {
+        let named = classes.named(self.of(classes));
+        let code = |of: fn(&MaterialName) -> Option<u16>| named.and_then(of).and_then(|code| i16::try_from(code).ok());
+        [code(|named| named.surface_code).unwrap_or(self.number()), code(|named| named.feature_id).unwrap_or(0)]
     }
 
     /// Red, green and blue from 0 to 255, as screens show them.
     pub(crate) fn color(self, classes: Classes) -> [u8; 3] {
         match self.sheet {
-            Sheet::Objects => OBJECT_MATERIALS[usize::from(self.class)].1,
+            Sheet::Objects => OBJECT_COLORS[usize::from(self.class)],
             Sheet::Ground | Sheet::Decks | Sheet::Ribbons => classes.color(self.class),
         }
     }

@@ -10,7 +10,7 @@ use schedule::Workers;
 use serde_json::Value;
 use terrain::{Draped, ModuleRect};
 
-use crate::{ByteRaster, Coordinates, ExportError, Mesh, Product, Put, Textures, Work, samples};
+use crate::{ByteRaster, Coordinates, ExportError, Mesh, Product, Put, TextureFile, Textures, Work, samples};
 
 /// A mesh of a binary glTF: its name and material, and its triangles with y up.
 struct Found {
@@ -298,7 +298,7 @@ fn textured(folder: &Path, product: Product, texel_m: f64) -> Product {
     let path = folder.join("board.tif");
     checkerboard(&path);
     let ends = [[505_000.0, 3_875_000.0], [506_000.0, 3_875_500.0]];
-    let textures = Textures::open(&[path], product.crs(), ends, Some(texel_m), 4096).unwrap();
+    let textures = Textures::open(&[path], product.crs(), ends, Some(texel_m), (TextureFile::Jpeg, 4096)).unwrap();
     Product { textures: Some(Arc::new(textures)), ..product }
 }
 
@@ -349,7 +349,7 @@ fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
     let folder = tempfile::tempdir().unwrap();
     let product = textured(folder.path(), samples::product(), 1.0);
     let of = |west: u32| ModuleRect { south: 0, west, north: 1, east: west + 1 };
-    let texture = |rect: ModuleRect, texel_m: f64| decoded(&product.texture(rect, texel_m).unwrap().unwrap().jpeg);
+    let texture = |rect: ModuleRect, texel_m: f64| decoded(&product.texture(rect, texel_m).unwrap().unwrap().bytes);
     let ((west, wide, high), (east, _, _)) = (texture(of(0), 0.0), texture(of(1), 0.0));
     assert_eq!((wide, high), (501, 501));
     let off = (0..high).map(|row| west[row * wide + wide - 1].abs_diff(east[row * wide])).max().unwrap();
@@ -456,4 +456,91 @@ fn engines_and_simulators_find_the_photo_where_their_vertices_lie() {
     assert_eq!(points.len(), places.len());
     points.iter().zip(&places).for_each(|(at, uv)| check_place([at[0], at[1]], [uv[0], uv[1]]));
     assert!(obj.contains(&format!("mtllib {file}.mtl\n")) && obj.contains("/1 "));
+}
+
+#[test]
+fn places_along_a_way_go_on_where_it_does_and_across_it_from_its_left_edge_to_its_right_one() {
+    let bytes = glb(&samples::with_ways());
+    let (document, binary) = document(&bytes);
+    let mut triangles = Vec::new();
+    for mesh in document["meshes"].as_array().unwrap() {
+        for primitive in mesh["primitives"].as_array().unwrap() {
+            let material = &document["materials"][number(&primitive["material"])]["name"];
+            let Some(lanes) = primitive["attributes"].get("TEXCOORD_0") else {
+                assert_eq!(material, "default", "ribbons alone have lanes here");
+                continue;
+            };
+            let read = |index: &Value| accessor(&document, binary, index);
+            let (places, lanes) = (read(&primitive["attributes"]["POSITION"]), read(lanes));
+            let corners = read(&primitive["indices"]).into_iter().map(|index| index[0] as usize);
+            let corner = |at: usize| [places[at][0], -places[at][2], lanes[at][0], lanes[at][1]];
+            let all: Vec<[f64; 4]> = corners.map(corner).collect();
+            triangles.extend(all.as_chunks::<3>().0.iter().map(|corners| (*corners, material == "minor")));
+        }
+    }
+    // Across and along at a place of the road, or of the stream.
+    let at = |[x, y]: [f64; 2], is_road: bool| -> [f64; 2] {
+        let side = |p: &[f64; 4], q: &[f64; 4]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+        let over = |[a, b, c]: &[[f64; 4]; 3]| {
+            let parts = [side(b, c), side(c, a), side(a, b)];
+            let all: f64 = parts.iter().sum();
+            let is_over = 0.0 < all && parts.iter().all(|part| -1e-9 * all <= *part);
+            is_over.then(|| [2, 3].map(|of| (parts[0] * a[of] + parts[1] * b[of] + parts[2] * c[of]) / all))
+        };
+        triangles.iter().filter(|(_, of)| *of == is_road).find_map(|(corners, _)| over(corners)).unwrap()
+    };
+    let [first, second] = [30_000.0_f64.hypot(10_000.0), 24_000.0].map(|quanta| quanta / 128.0);
+    let y = 30_000.0 / 128.0;
+    for (place, expected) in [
+        ([450.0, y], [0.5, first + 450.0 - 312.5]),
+        ([450.0, y + 3.0], [0.5 - 3.0 / 7.0, first + 450.0 - 312.5]),
+        ([450.0, y - 3.0], [0.5 + 3.0 / 7.0, first + 450.0 - 312.5]),
+        // Beyond the line between load modules, where the road turns to the north-east.
+        ([600.0, y + 100.0], [0.5, first + second + 100.0 * 2.0_f64.sqrt()]),
+    ] {
+        let found = at(place, true);
+        let off = [found[0] - expected[0], found[1] - expected[1]];
+        assert!(off[0].abs() < 0.05 && off[1].abs() < 2.0, "{place:?}: {found:?} {expected:?}");
+    }
+    let stream = at([50_000.0 / 128.0 + 0.5, 300.0], false);
+    assert!((stream[0] - 0.75).abs() < 0.01 && (stream[1] - 300.0).abs() < 0.01, "{stream:?}");
+}
+
+#[test]
+fn coarser_levels_are_nodes_that_take_the_place_of_finer_ones() {
+    let product = samples::with_levels();
+    let (document, _) = document(&glb(&product));
+    let nodes = document["nodes"].as_array().unwrap();
+    assert_eq!(document["extensionsUsed"], serde_json::json!(["MSFT_lod"]));
+    assert_eq!(document["scenes"][0]["nodes"], serde_json::json!([0, 1]));
+    let east = nodes.iter().find(|node| node["name"] == "r0000c0001").unwrap();
+    let coarser = &nodes[number(&east["extensions"]["MSFT_lod"]["ids"][0])];
+    let triangles = |node: &Value| -> usize {
+        let primitives = document["meshes"][number(&node["mesh"])]["primitives"].as_array().unwrap();
+        primitives.iter().map(|of| number(&document["accessors"][number(&of["indices"])]["count"]) / 3).sum()
+    };
+    assert_eq!((coarser["name"].as_str(), triangles(east), triangles(coarser)), (Some("r0000c0001_lod1"), 4, 2));
+    let shares: Vec<f64> =
+        east["extras"]["MSFT_screencoverage"].as_array().unwrap().iter().map(|of| of.as_f64().unwrap()).collect();
+    assert!(0.0 < shares[0] && shares[0] < 0.01 && shares[1] == 0.0, "{shares:?}");
+
+    let flt = files(|put, work| crate::write_openflight(&product, put, work));
+    let (bytes, mut at, mut levels) = (&flt["squares/r00c00.flt"], 0, Vec::new());
+    while at < bytes.len() {
+        let word = |at: usize| u16::from_be_bytes([bytes[at], bytes[at + 1]]);
+        let double = |from: usize| f64::from_be_bytes(bytes[at + from..][..8].try_into().unwrap());
+        if word(at) == 73 {
+            levels.push([double(24), double(16)]);
+        }
+        at += usize::from(word(at + 2));
+    }
+    // From where one is no longer shown the other is.
+    assert!(levels.len() == 2 && levels[0] == [0.0, levels[1][0]] && 9000.0 < levels[1][0], "{levels:?}");
+
+    let usd = files(|put, work| crate::write_usd(&product, put, work));
+    assert_eq!(usd.keys().collect::<Vec<_>>(), ["area.usda", "tiles/tile_r00c00.usda", "tiles/tile_r00c00_lod1.usda"]);
+    let text = String::from_utf8_lossy(&usd["area.usda"]);
+    for part in ["string lod = \"lod0\"", "\"lod1\" (", "@./tiles/tile_r00c00_lod1.usda@", "lod:error_m = 9.375"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
 }

@@ -1,7 +1,9 @@
 //! Textures from orthophotos: one for each unit that a program loads, seen straight from above.
 
+use std::error::Error;
 use std::fmt;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::ExportError;
 use source_files::{Crs, Imagery, Keep, SourceError, Square};
@@ -10,8 +12,32 @@ use source_files::{Crs, Imagery, Keep, SourceError, Square};
 const KEPT_BYTES_MAX: usize = 256 << 20;
 /// Sides of what a picture draws at once are multiples of this.
 const SIDE_STEP: usize = 16;
+/// How many times the wanted texel one is that is told of.
+const COARSER: f64 = 1.05;
 /// Quality of a texture as JPEG, of 100.
 const QUALITY: u8 = 90;
+
+/// What kind of file a texture is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureFile {
+    /// JPEG.
+    Jpeg,
+    /// PNG, which loses nothing.
+    Png,
+    /// SGI's RGB, not compressed, for image generators.
+    Rgb,
+}
+
+impl TextureFile {
+    /// What names of such files end in.
+    pub(crate) const fn extension(self) -> &'static str {
+        match self {
+            Self::Jpeg => "jpg",
+            Self::Png => "png",
+            Self::Rgb => "rgb",
+        }
+    }
+}
 
 /// Orthophotos laid over a product, later ones above earlier.
 pub struct Textures {
@@ -20,6 +46,9 @@ pub struct Textures {
     keep: Keep,
     texel_m: f64,
     side_max: usize,
+    file: TextureFile,
+    /// Bits of the largest texel so far of a texture that was to have the finest.
+    largest_m: AtomicU64,
 }
 
 impl fmt::Debug for Textures {
@@ -46,7 +75,9 @@ pub(crate) struct Place {
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// Its file.
-    pub jpeg: Vec<u8>,
+    pub bytes: Vec<u8>,
+    /// What kind of file it is.
+    pub(crate) file: TextureFile,
     /// West and north of its north-western corner, in metres from the south-west corner of what is exported.
     corner_m: [f64; 2],
     size_m: [f64; 2],
@@ -71,7 +102,7 @@ impl Textures {
         crs: &str,
         [low, high]: [[f64; 2]; 2],
         texel_m: Option<f64>,
-        side_max: usize,
+        (file, side_max): (TextureFile, usize),
     ) -> Result<Self, ExportError> {
         let crs = Crs::named(crs).map_err(|found| ExportError::Impossible {
             what: format!("the coordinate system {crs}"),
@@ -92,14 +123,32 @@ impl Textures {
         let middle = [0, 1].map(|axis| f64::midpoint(low[axis], high[axis]));
         let own = pictures.iter().filter_map(|picture| picture.pixel_m(&crs, middle)).fold(f64::INFINITY, f64::min);
         let texel_m = texel_m.unwrap_or(if own.is_finite() { own } else { 1.0 });
-        Ok(Self { pictures, crs, keep: Keep::new(KEPT_BYTES_MAX), texel_m, side_max })
+        let (keep, largest_m) = (Keep::new(KEPT_BYTES_MAX), AtomicU64::new(0));
+        Ok(Self { pictures, crs, keep, texel_m, side_max, file, largest_m })
+    }
+
+    /// What names of textures end in.
+    pub fn extension(&self) -> &'static str {
+        self.file.extension()
+    }
+
+    /// The texel that was wanted, and the largest that a texture came to for having too many of them, in metres; `None`
+    /// where all have the one that was wanted, but for what load modules need to have a whole number of them.
+    pub fn coarser_m(&self) -> Option<[f64; 2]> {
+        let largest_m = f64::from_bits(self.largest_m.load(Ordering::Relaxed));
+        (COARSER * self.texel_m < largest_m).then_some([self.texel_m, largest_m])
     }
 
     /// The texture of the load modules of a rectangle, with texels no finer than `texel_m`.
     pub(crate) fn of(&self, place: &Place, texel_m: f64) -> Result<Texture, ExportError> {
         let &Place { origin_m, low_m, high_m, module_m, below } = place;
         let sides = [0, 1].map(|axis| high_m[axis] - low_m[axis]);
-        let texel_m = self.texel_m(module_m, sides[0].max(sides[1]), texel_m);
+        let wanted_m = texel_m;
+        let texel_m = self.texel_m(module_m, sides[0].max(sides[1]), wanted_m);
+        if wanted_m == 0.0 {
+            // Positive numbers have their bits in their order.
+            self.largest_m.fetch_max(texel_m.to_bits(), Ordering::Relaxed);
+        }
         let texels = sides.map(|side| (side / texel_m - 1e-9).ceil() as usize + 1);
         let side = texels[0].max(texels[1]).next_multiple_of(SIDE_STEP);
         let corner = [low_m[0] - texel_m / 2.0, high_m[1] + texel_m / 2.0];
@@ -116,7 +165,8 @@ impl Textures {
         let rows = pixels.chunks_exact(4 * side).take(texels[1]);
         let colors: Vec<u8> = rows.flat_map(|row| row[..4 * texels[0]].as_chunks::<4>().0).flat_map(opaque).collect();
         Ok(Texture {
-            jpeg: jpeg(&colors, texels)?,
+            bytes: encoded(self.file, &colors, texels)?,
+            file: self.file,
             corner_m: [0, 1].map(|axis| corner[axis] - origin_m[axis]),
             size_m: texels.map(|count| count as f64 * texel_m),
         })
@@ -130,14 +180,61 @@ impl Textures {
     }
 }
 
-fn jpeg(colors: &[u8], [wide, high]: [usize; 2]) -> Result<Vec<u8>, ExportError> {
+/// The file of a picture, row by row from the north.
+fn encoded(file: TextureFile, colors: &[u8], [wide, high]: [usize; 2]) -> Result<Vec<u8>, ExportError> {
+    let fault = |error: Box<dyn Error + Send + Sync>| ExportError::write("texture")(std::io::Error::other(error));
     let mut bytes = Vec::new();
-    let encoder = jpeg_encoder::Encoder::new(&mut bytes, QUALITY);
-    let made = encoder.encode(colors, wide as u16, high as u16, jpeg_encoder::ColorType::Rgb);
-    made.map_err(|error| ExportError::write("texture")(std::io::Error::other(error)))?;
+    match file {
+        TextureFile::Jpeg => {
+            let encoder = jpeg_encoder::Encoder::new(&mut bytes, QUALITY);
+            let made = encoder.encode(colors, wide as u16, high as u16, jpeg_encoder::ColorType::Rgb);
+            made.map_err(|error| fault(error.into()))?;
+        }
+        TextureFile::Png => {
+            let mut encoder = png::Encoder::new(&mut bytes, wide as u32, high as u32);
+            encoder.set_color(png::ColorType::Rgb);
+            let mut writer = encoder.write_header().map_err(|error| fault(error.into()))?;
+            writer.write_image_data(colors).map_err(|error| fault(error.into()))?;
+            writer.finish().map_err(|error| fault(error.into()))?;
+        }
+        TextureFile::Rgb => bytes = sgi(colors, [wide, high]),
+    }
     Ok(bytes)
 }
 
+/// A picture as SGI has it: a head of 512 bytes, then all red, all green and all blue, each from the south.
+fn sgi(colors: &[u8], [wide, high]: [usize; 2]) -> Vec<u8> {
+    const HEAD_BYTES: usize = 512;
+    // Its mark; not compressed, a byte each.
+    let mut bytes = vec![1, 218, 0, 1];
+    for number in [3, wide as u16, high as u16, 3] {
+        bytes.extend(number.to_be_bytes());
+    }
+    // The least and the largest value.
+    for number in [0, u32::from(u8::MAX)] {
+        bytes.extend(number.to_be_bytes());
+    }
+    bytes.resize(HEAD_BYTES, 0);
+    for part in 0..3 {
+        for row in colors.chunks(3 * wide).rev() {
+            bytes.extend(row.iter().skip(part).step_by(3));
+        }
+    }
+    bytes
+}
+
 fn of_source(error: SourceError) -> ExportError {
-    ExportError::Ground { message: error.to_string(), hint: None }
+    ExportError::Ground { message: error.to_string(), hint: error.hint() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_of_sgi_has_its_colours_one_after_the_other_from_the_south() {
+        let bytes = sgi(&[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12], [2, 2]);
+        assert_eq!(bytes[..20], [1, 218, 0, 1, 0, 3, 0, 2, 0, 2, 0, 3, 0, 0, 0, 0, 0, 0, 0, 255]);
+        assert_eq!(bytes[512..], [7, 10, 1, 4, 8, 11, 2, 5, 9, 12, 3, 6]);
+    }
 }

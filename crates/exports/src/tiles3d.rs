@@ -12,9 +12,10 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
-use terrain::{ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{ModuleRect, metres_of_quanta};
 
 use crate::coarse::Coarse;
+use crate::detail::{largest_residual_m, steps};
 use crate::earth::Earth;
 use crate::glb::{Gltf, GltfNode, turned};
 use crate::glb_features::FoundFeatures;
@@ -137,7 +138,7 @@ struct Layers {
 impl Layers {
     fn of(product: &Product, earth: Earth, work: &Work) -> Result<Self, ExportError> {
         let layer = |product: Product| {
-            let mesh = Mesh::whole(&product).with_sheets(&product);
+            let mesh = Mesh::whole(&product).with_sheets(&product).with_lanes(&product);
             let globe = Globe::of(&product, &mesh, &earth, work)?;
             Ok(Layer { product, mesh, globe })
         };
@@ -193,17 +194,16 @@ impl Layers {
         }
         let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, parts)| layer.places(&frame, parts)));
         let mut children = finest.groups(&frame, rect, take)?;
-        let mut error_m = finest.error_m(rect);
-        for (layer, parts) in self.layers.iter().zip(&parts).skip(1) {
+        // A viewer would not go on to what is finer if what is coarser were said to be truer.
+        let steps = steps(self.layers.iter().map(|layer| &layer.product), rect);
+        for ((layer, parts), step) in self.layers.iter().zip(&parts).zip(&steps).skip(1) {
             let name = square_name(&layer.product, rect, "glb");
-            let uri = format!("levels/{}/{name}", layer.product.level);
-            let texture = layer.product.texture(rect, layer.error_m(rect))?;
+            let uri = format!("levels/{}/{name}", step.level);
+            let texture = layer.product.texture(rect, step.error_m)?;
             take(&uri, &|| layer.gltf(&frame, rect, parts, texture.clone()).bytes())?;
-            // What is coarser is never said to be truer, or a viewer would not go on to the finer.
-            error_m = error_m.max(layer.error_m(rect));
             let mut level = json!({
                 "boundingVolume": { "box": bounds },
-                "geometricError": error_m,
+                "geometricError": step.error_m,
                 "content": { "uri": uri },
             });
             put_children(&mut level, children);
@@ -214,7 +214,10 @@ impl Layers {
         let mut tile = json!({
             "transform": frame.matrix(),
             "boundingVolume": { "box": bounds },
-            "geometricError": if self.layers.len() == 1 { coarse_error_m } else { coarse_error_m.max(error_m) },
+            "geometricError": match steps.as_slice() {
+                [.., _, coarsest] => coarse_error_m.max(coarsest.error_m),
+                _ => coarse_error_m,
+            },
         });
         put_children(&mut tile, children);
         if !coarse.triangles.is_empty() {
@@ -256,11 +259,12 @@ impl Layer {
             let features = (*sheet == Sheet::Objects).then(|| FoundFeatures::of(part));
             let texture = texture.as_ref().filter(|_| *sheet != Sheet::Objects);
             let node = self.node(frame, sheet_name(*sheet, rect), &part.vertices, texture);
-            let node = GltfNode { features, ..node };
+            let node = GltfNode { features, lanes: part.lanes.clone(), ..node };
             (*sheet, vec![node.with_groups(&part.triangles, &part.classes)])
         };
         let sheets = parts.iter().map(node).collect();
-        Gltf { sheets, classes: self.product.classes(), texture, ..Gltf::default() }
+        let thanks = self.product.attributions().join("; ");
+        Gltf { sheets, classes: self.product.classes(), thanks, texture, ..Gltf::default() }
     }
 
     /// Hands out a file for each group of load modules of a square; their tiles.
@@ -282,17 +286,11 @@ impl Layer {
             take(&uri, &|| self.gltf(frame, rect, &parts, texture.clone()).bytes())?;
             tiles.push(json!({
                 "boundingVolume": { "box": box_around(self.places(frame, &parts)) },
-                "geometricError": self.error_m(rect),
+                "geometricError": largest_residual_m(&self.product, rect),
                 "content": { "uri": uri },
             }));
         }
         Ok(tiles)
-    }
-
-    /// The largest residual of the load modules of a rectangle, in metres.
-    fn error_m(&self, rect: ModuleRect) -> f64 {
-        let residuals = rect.iter().filter_map(|id| self.product.module(id)).map(|module| module.residual.largest);
-        f64::from(residuals.max().unwrap_or(0)) / f64::from(QUANTA_PER_METRE)
     }
 
     /// Where the vertices of all sheets lie in a frame.

@@ -3,12 +3,13 @@
 //! Points of a tile are counted from its own south-west corner and are whole 1/128 m, which a 32-bit float holds
 //! exactly; the area's file moves each tile to its place. Ground, decks and objects are meshes of triangles, all but
 //! ribbons and woods with a collision schema; classes are subsets of faces with materials. Triangles over holes are
-//! left out.
+//! left out. Where load modules have coarser levels, a tile has a variant for each, with a file of its own.
 
 use std::fmt::Write as _;
 
 use terrain::{ModuleRect, QUANTA_PER_METRE, TileId};
 
+use crate::detail::{Detail, Step, steps};
 use crate::mesh::Part;
 use crate::objects::Thing;
 use crate::sheets::Material;
@@ -19,25 +20,35 @@ use crate::{Coordinates, ExportError, Facts, Mesh, Product, Put, Sheet, Texture,
 /// # Errors
 /// When a file cannot be written, or the work was asked to stop.
 pub fn write_usd(product: &Product, put: &Put, work: &Work) -> Result<(), ExportError> {
-    let mesh = Mesh::of(product);
-    let normals = mesh.normals();
+    let details = Detail::all(product, Mesh::of(product));
     let tiles = tiles(product);
     work.each("tiles", &tiles, |tile| {
         let texture = product.texture(tile.rect, 0.0)?;
-        let text = tile_text(product, &mesh, &normals, tile, texture.as_ref());
-        let name = format!("tiles/{}.usda", tile.name);
-        put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+        for detail in &details {
+            let name = tile.file(detail.product.level, product);
+            let text = tile_text(detail, tile, texture.as_ref());
+            put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+        }
         let Some(texture) = texture else { return Ok(()) };
-        let name = format!("tiles/{}.jpg", tile.name);
-        put(&name, &texture.jpeg).map_err(ExportError::write(&name))
+        let name = format!("tiles/{}.{}", tile.name, product.texture_extension());
+        put(&name, &texture.bytes).map_err(ExportError::write(&name))
     })?;
-    put("area.usda", area_text(product, &tiles).as_bytes()).map_err(ExportError::write("area.usda"))
+    let levels = details.iter().map(|detail| &detail.product).collect::<Vec<_>>();
+    put("area.usda", area_text(&levels, &tiles).as_bytes()).map_err(ExportError::write("area.usda"))
 }
 
 /// The part of a tile that is exported.
 struct Tile {
     name: String,
     rect: ModuleRect,
+}
+
+impl Tile {
+    /// The name of its file at a level of a product.
+    fn file(&self, level: usize, product: &Product) -> String {
+        let coarser = if level == product.level { String::new() } else { format!("_lod{level}") };
+        format!("tiles/{}{coarser}.usda", self.name)
+    }
 }
 
 /// The tiles of a product that have load modules in it, row by row from the south-west.
@@ -67,7 +78,8 @@ fn tiles(product: &Product) -> Vec<Tile> {
 
 const HEAD: &str = "    metersPerUnit = 1\n    upAxis = \"Z\"\n";
 
-fn area_text(product: &Product, tiles: &[Tile]) -> String {
+fn area_text(levels: &[&Product], tiles: &[Tile]) -> String {
+    let product = levels[0];
     let root = identifier(&product.manifest.area.name, "area");
     let facts = Facts::z_up(product, Coordinates::Local);
     let [east, north, up] = facts.offset_m;
@@ -81,18 +93,46 @@ fn area_text(product: &Product, tiles: &[Tile]) -> String {
     let _ = writeln!(text, "        double3 offset_m = ({east}, {north}, {up})\n    }}\n)\n");
     let _ = writeln!(text, "def Xform \"{root}\" (\n    kind = \"assembly\"\n)\n{{");
     for tile in tiles {
-        let [x, y] = corner(product, tile).map(metres);
-        let _ = write!(
-            text,
-            "    def Xform \"{name}\" (\n        kind = \"component\"\n        \
-             prepend payload = @./tiles/{name}.usda@\n    )\n    \
-             {{\n        double3 xformOp:translate = ({x}, {y}, 0)\n        \
-             uniform token[] xformOpOrder = [\"xformOp:translate\"]\n    }}\n",
-            name = tile.name
-        );
+        put_tile(&mut text, levels, tile);
     }
     text.push_str("}\n");
     text
+}
+
+/// A tile at its place: its file, or a variant for each of its levels, the finest of which is chosen.
+fn put_tile(text: &mut String, levels: &[&Product], tile: &Tile) {
+    let product = levels[0];
+    let (name, [x, y]) = (&tile.name, corner(product, tile).map(metres));
+    let payload = |level: usize| format!("prepend payload = @./{}@", tile.file(level, product));
+    let _ = writeln!(text, "    def Xform \"{name}\" (\n        kind = \"component\"");
+    let _ = match levels {
+        [_] => writeln!(text, "        {}", payload(product.level)),
+        _ => writeln!(
+            text,
+            "        variants = {{\n            string lod = \"lod{}\"\n        }}\n        \
+             prepend variantSets = \"lod\"",
+            product.level
+        ),
+    };
+    let _ = write!(
+        text,
+        "    )\n    {{\n        double3 xformOp:translate = ({x}, {y}, 0)\n        \
+         uniform token[] xformOpOrder = [\"xformOp:translate\"]\n"
+    );
+    if 1 < levels.len() {
+        text.push_str("        variantSet \"lod\" = {\n");
+        for Step { level, error_m, near_m } in steps(levels.iter().copied(), tile.rect) {
+            let _ = write!(
+                text,
+                "            \"lod{level}\" (\n                {}\n            ) {{\n                \
+                 custom double lod:error_m = {error_m}\n                \
+                 custom double lod:near_m = {near_m}\n            }}\n",
+                payload(level)
+            );
+        }
+        text.push_str("        }\n");
+    }
+    text.push_str("    }\n");
 }
 
 /// East and north in quanta from the south-west corner of what is exported to that of a tile.
@@ -100,7 +140,8 @@ fn corner(product: &Product, tile: &Tile) -> [i32; 2] {
     product.corner(terrain::ModuleId { row: tile.rect.south, col: tile.rect.west })
 }
 
-fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile, texture: Option<&Texture>) -> String {
+fn tile_text(detail: &Detail, tile: &Tile, texture: Option<&Texture>) -> String {
+    let Detail { product, mesh, normals } = detail;
     let parts = mesh.parts(product, tile.rect);
     let of_part = |(sheet, part): &(Sheet, Part)| {
         let sheet = *sheet;
@@ -113,14 +154,17 @@ fn tile_text(product: &Product, mesh: &Mesh, normals: &[[f64; 3]], tile: &Tile, 
     let mut text = format!("#usda 1.0\n(\n    defaultPrim = \"{root}\"\n{HEAD})\n\ndef Xform \"{root}\"\n{{\n");
     text.push_str("    def Scope \"Materials\"\n    {\n");
     for &material in &materials {
-        let photo = texture.filter(|_| material.sheet != Sheet::Objects).map(|_| format!("{root}.jpg"));
+        let photo = texture
+            .filter(|_| material.sheet != Sheet::Objects)
+            .map(|_| format!("{root}.{}", product.texture_extension()));
         put_material(&mut text, product, root, material, photo.as_deref());
     }
     text.push_str("    }\n");
     let corner = corner(product, tile);
     for (sheet, part) in &parts {
         let draw = |text: &mut String, thing: Option<Thing>, part: &Part| {
-            put_mesh(text, &Drawn { product, mesh, normals, texture, corner, root, sheet: *sheet, thing, part });
+            let sheet = *sheet;
+            put_mesh(text, &Drawn { product, mesh, normals, texture, corner, root, sheet, thing, part });
         };
         if *sheet != Sheet::Objects {
             draw(&mut text, None, part);
@@ -229,6 +273,11 @@ fn put_mesh(text: &mut String, drawn: &Drawn) {
         // From the southern side.
         let places = mesh.uvs(texture, &part.vertices).into_iter().map(|[u, v]| format!("({u}, {})", 1.0 - v));
         put_list(text, "texCoord2f[] primvars:st", places);
+        text.pop();
+        text.push_str(VERTEX);
+    }
+    if !part.lanes.is_empty() {
+        put_list(text, "texCoord2f[] primvars:lane", part.lanes.iter().map(|[u, v]| format!("({u}, {v})")));
         text.pop();
         text.push_str(VERTEX);
     }

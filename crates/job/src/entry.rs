@@ -9,6 +9,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use crate::bounds::NAME_CHARS_MAX;
 use crate::key::whole_text;
 use crate::{Choice, Fault, JobError, NamedFile, NoArea, Values, keys, remote};
 
@@ -236,6 +237,17 @@ impl<'a> Entry<'a> {
         };
         let is_good = !text.trim().is_empty() && text.chars().count() <= *most && !text.contains(refused);
         if is_good { Ok(text.to_owned()) } else { Err(self.out_of_range(self.expected())) }
+    }
+
+    /// The value as a name of letters, digits and few other characters.
+    pub fn name(&self, hint: &str) -> Result<String, JobError> {
+        let name = self.text()?;
+        let good = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+        let begins = name.starts_with(|c: char| c.is_ascii_alphanumeric());
+        if !begins || !name.chars().all(good) || NAME_CHARS_MAX < name.len() {
+            return Err(self.out_of_range_with(self.expected(), hint));
+        }
+        Ok(name.to_owned())
     }
 
     /// The file that the value names, relative to the folder of the job, or its address on another machine.

@@ -66,7 +66,10 @@ pub(crate) fn table(place: &str) -> &'static [Key] {
         (Some(at), true) => format!("{}[]", &place[..at]),
         _ => place.to_owned(),
     };
-    TABLES.iter().find(|known| known.place == place).map_or(&[], |known| known.keys)
+    let find = |place: &str| TABLES.iter().find(|known| known.place == place);
+    // What stands in a table of any keys is an item of it.
+    let item = || find(&format!("{}[]", place.rsplit_once('.')?.0));
+    find(&place).or_else(item).map_or(&[], |known| known.keys)
 }
 
 /// The names of the keys of a table.

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use terrain::{
-    Effort, HeightFit, LastBatch, Lattice, LoadModule, ModuleGrid, QUANTA_PER_METRE, Resampling, Spacing, TileOrder,
+    Effort, HeightFit, LastBatch, Lattice, LoadModule, MaterialName, ModuleGrid, QUANTA_PER_METRE, Resampling, Spacing,
+    TileOrder,
 };
 
 use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, ObjectsSpec, Start, WaterSpec};
@@ -33,6 +34,8 @@ pub struct Job {
     pub tin: TinSpec,
     /// Coarser levels of load modules.
     pub lod: LodSpec,
+    /// What exports call materials, sorted by what these are.
+    pub materials: Vec<MaterialName>,
 }
 
 impl Job {

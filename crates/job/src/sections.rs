@@ -2,6 +2,8 @@
 //!
 //! The reader takes ranges and defaults from here, `describe` the meanings, `docs/reference/job-keys.md` everything.
 
+use std::ops::RangeInclusive;
+
 use terrain::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 
 use crate::bounds::{
@@ -19,7 +21,7 @@ use crate::{
 };
 
 /// All tables, the sections in their order, each before those that stand in it.
-pub(crate) static TABLES: [KeyTable; 23] = [
+pub(crate) static TABLES: [KeyTable; 25] = [
     KeyTable { place: "area", meaning: "The gaming area, whole load modules, and its working grid.", keys: AREA },
     KeyTable { place: "area.around", meaning: "An area around a place.", keys: AROUND },
     KeyTable { place: "dem", meaning: "Where heights come from.", keys: DEM },
@@ -75,6 +77,16 @@ pub(crate) static TABLES: [KeyTable; 23] = [
     KeyTable { place: "tin.start", meaning: "Points of another method to start from.", keys: START },
     KeyTable { place: "lod", meaning: "Coarser levels of load modules.", keys: LOD },
     KeyTable { place: "lod.levels[]", meaning: "A level beside the finest.", keys: LEVELS },
+    KeyTable {
+        place: "exports",
+        meaning: "What exports are told; nothing that is built depends on it.",
+        keys: EXPORTS,
+    },
+    KeyTable {
+        place: "exports.materials[]",
+        meaning: "A material, where more is to be said than its name.",
+        keys: MATERIALS,
+    },
 ];
 
 const AREA: &[Key] = &[
@@ -427,4 +439,25 @@ const LEVELS: &[Key] = &[
         .bounded(|| "a list of names of classes of features".to_owned())
         .otherwise("none")
         .example("{ inner_share = 0.2, leave_out = [\"track\", \"stream\"] }"),
+];
+
+const EXPORTS: &[Key] =
+    &[Key::new("materials", "what materials are called: of classes, and of objects (building_wall)")
+        .form("a table of names by classes and materials of objects; a name, or a table, each")
+        .otherwise("the names of classes, and those of the materials of objects")
+        .example("materials = { primary = \"asphalt\", building_wall = { name = \"plaster\", surface_code = 12 } }")];
+
+const MATERIAL_EXAMPLE: &str = "primary = { name = \"asphalt\", surface_code = 12, feature_id = 45 }";
+const CODES: RangeInclusive<u64> = 0..=32_767;
+
+const MATERIALS: &[Key] = &[
+    Key::new("name", "what it is called").bounded(name).example(MATERIAL_EXAMPLE),
+    Key::new("surface_code", "its surface material code (SMC) in OpenFlight")
+        .whole("a code", CODES)
+        .otherwise("the number of its class; from 256 on for objects")
+        .example(MATERIAL_EXAMPLE),
+    Key::new("feature_id", "its feature identification (FID) in OpenFlight")
+        .whole("an identification", CODES)
+        .otherwise("0")
+        .example(MATERIAL_EXAMPLE),
 ];

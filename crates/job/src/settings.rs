@@ -3,7 +3,7 @@
 //! One list serves both the announcement at the start of a run and the canonical text in `database.json`, so the two
 //! cannot disagree. The canonical text is itself a job: reading it gives the same settings again.
 
-use terrain::{THOUSANDTHS, metres_of_quanta};
+use terrain::{MaterialName, THOUSANDTHS, metres_of_quanta};
 
 use crate::setting_list::{List, Setting, counted, number, quoted};
 use crate::{
@@ -15,9 +15,10 @@ use crate::{
 const MODULES_FORMAT_USUAL: u32 = 3;
 
 /// The lines of a [canonical text](Job::canonical_text) that decide what is built: all but the title, which only stands
-/// above the report's page.
+/// above the report's page, and what exports are told.
 pub fn deciding_lines(canonical: &str) -> impl Iterator<Item = &str> {
-    canonical.lines().filter(|line| !line.starts_with("title = "))
+    let told = ["title = ", "[exports]", "materials = "];
+    canonical.lines().filter(move |line| told.iter().all(|start| !line.starts_with(start)))
 }
 
 impl Job {
@@ -34,6 +35,7 @@ impl Job {
         self.describe_limits(&mut list);
         self.describe_tin(&mut list);
         describe_lod(&self.lod, &mut list);
+        describe_materials(&self.materials, &mut list);
         list.0
     }
 
@@ -323,6 +325,25 @@ fn describe_lod(lod: &LodSpec, list: &mut List) {
         format!("{}, with this share of its inner vertices", counted(levels.len(), "level")),
     );
     list.choice("lod.border", &lod.border);
+}
+
+/// Materials that are called otherwise.
+fn describe_materials(materials: &[MaterialName], list: &mut List) {
+    if materials.is_empty() {
+        return;
+    }
+    let material = |MaterialName { of, name, surface_code, feature_id }: &MaterialName| {
+        let codes = [("surface_code", surface_code), ("feature_id", feature_id)];
+        let codes: String = codes.iter().filter_map(|(key, code)| Some(format!(", {key} = {}", (**code)?))).collect();
+        let (of, name) = (quoted(of), quoted(name));
+        if codes.is_empty() { format!("{of} = {name}") } else { format!("{of} = {{ name = {name}{codes} }}") }
+    };
+    let text = materials.iter().map(material).collect::<Vec<_>>().join(", ");
+    list.say(
+        "exports.materials",
+        format!("{{ {text} }}"),
+        format!("{} so called", counted(materials.len(), "material")),
+    );
 }
 
 #[cfg(test)]

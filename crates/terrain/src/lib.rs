@@ -45,6 +45,8 @@ mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod class_colors;
 pub use class_colors::{FEATURE_COLORS, named_class_color};
+mod materials;
+pub use materials::{MaterialName, OBJECT_MATERIALS};
 mod draped;
 pub use draped::{Draped, Flat};
 mod each;

@@ -14,7 +14,8 @@ use serde_json::{Value, json};
 use terrain::HOLE_CLASS;
 
 use crate::classes::HOLE_NAME;
-use crate::{ExportError, Product, Put, Work};
+use crate::sheets::Material;
+use crate::{ExportError, Product, Put, Sheet, Work};
 pub use engine::Engine;
 use placements::placements;
 use samples::{Off, Samples};
@@ -144,7 +145,7 @@ fn layers(product: &Product, samples: &Samples) -> Vec<Layer> {
     samples.classes.iter().for_each(|&class| is_there[usize::from(class)] = true);
     let name = |class: u8| match class {
         HOLE_CLASS => HOLE_NAME.to_owned(),
-        class => product.classes().material(product.classes().word(class)),
+        class => Material { sheet: Sheet::Ground, class }.word(product.classes()),
     };
     let there = (0..=u8::MAX).filter(|&class| is_there[usize::from(class)]);
     let layers: Vec<Layer> = there.map(|class| Layer { class, name: name(class) }).collect();

@@ -6,8 +6,7 @@
 use terrain::{Metres, ModuleGrid, QUANTA_PER_METRE, Spacing};
 
 use crate::bounds::{
-    AROUND_KM_MAX, CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, NAME_CHARS_MAX,
-    SIDE_QUANTA_MAX,
+    AROUND_KM_MAX, CELLS_A_SIDE_MAX, COORDINATE_M_MAX, EPSG_GEOGRAPHIC, EPSG_RANGE, MODULES_MAX, SIDE_QUANTA_MAX,
 };
 use crate::entry::{Entry, Section};
 use crate::{Area, AreaFound, AreaPlace, AreaRequest, Edges, JobError, Method, ModulesSpec, OuterBorder};
@@ -16,7 +15,8 @@ use crate::{Area, AreaFound, AreaPlace, AreaRequest, Edges, JobError, Method, Mo
 pub(super) type Find<'a> = dyn FnMut(&AreaRequest, &Entry) -> Result<AreaFound, JobError> + 'a;
 
 pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result<(Area, ModulesSpec), JobError> {
-    let (name, title) = (name(area)?, title(area)?);
+    let name = area.required("name")?.name("the database is named after it: NAME.tdb")?;
+    let title = title(area)?;
     let epsg = epsg(area)?;
     let place = open_place(area, epsg)?;
     let origin_m = if place.is_none() { origin(area)? } else { [0.0; 2] };
@@ -77,17 +77,6 @@ fn open_place<'a>(area: &Section<'a>, epsg: Option<u32>) -> Result<Option<(Entry
             Ok(Some((entry, AreaPlace::Around { latitude, longitude, size_m })))
         }
     }
-}
-
-fn name(area: &Section) -> Result<String, JobError> {
-    let entry = area.required("name")?;
-    let name = entry.text()?;
-    let good = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
-    let begins = name.starts_with(|c: char| c.is_ascii_alphanumeric());
-    if !begins || !name.chars().all(good) || NAME_CHARS_MAX < name.len() {
-        return Err(entry.out_of_range_with(entry.expected(), "the database is named after it: NAME.tdb"));
-    }
-    Ok(name.to_owned())
 }
 
 /// What a page of the area is called: one line of text.

@@ -2,6 +2,7 @@
 
 mod area;
 mod dem;
+mod exports;
 mod features;
 mod given;
 mod importance;
@@ -31,6 +32,7 @@ struct Sections<'a> {
     limits: Section<'a>,
     tin: Section<'a>,
     lod: Section<'a>,
+    exports: Section<'a>,
 }
 
 /// Reads a job and lists the files it mentions; does not look at the disk.
@@ -57,6 +59,7 @@ pub(crate) fn read<'a>(
         limits: section("limits")?,
         tin: section("tin")?,
         lod: section("lod")?,
+        exports: section("exports")?,
     };
     job_of(&sections, path, find)
 }
@@ -90,8 +93,10 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     features::refuse_beside(&sections.features, others, modules.edges, tin.method.name())?;
     modules.outer_border = area::outer_border(&sections.modules, modules.edges, tin.method)?;
     let lod = lod::read(&sections.lod, features.as_ref())?;
-    let path = path.to_owned();
-    Ok((Job { path, area, dem, importance, features, objects, tiles, modules, limits, tin, lod }, mentions))
+    let (path, materials) = (path.to_owned(), Vec::new());
+    let mut job = Job { path, area, dem, importance, features, objects, tiles, modules, limits, tin, lod, materials };
+    job.materials = exports::read(&sections.exports, &job.class_names())?;
+    Ok((job, mentions))
 }
 
 /// The files of `dem.sources`, patterns expanded.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use job::{
     Allocation, AreaShape, Budget, ClipHeights, Count, DemSource, Edges, Effort, ErrorKey, HeightFit, Job, LastBatch,
     Lattice, LodBorder, Method, Optimising, Proximity, SampleClass, Sight, TileOrder, Voids, WindowLimit,
+    deciding_lines,
 };
 use terrain::ModuleGrid;
 
@@ -49,6 +50,33 @@ fn the_shortest_job_has_the_documented_defaults() {
     assert_eq!(job.tin.method, Method::Optimised(usual));
     assert_eq!((job.tin.key, job.tin.budget), (ErrorKey::Sse, Budget::Limits));
     assert_eq!((job.tin.allocation, job.tin.residual_quantum), (Allocation::Global, 1));
+}
+
+#[test]
+fn materials_are_called_as_the_job_says_and_nothing_that_is_built_depends_on_it() {
+    let with = |materials: &str| format!("{SHORTEST}[exports.materials]\n{materials}\n");
+    let named = job(&with("wood_top = \"leaves\"\nbuilding_wall = { name = \"plaster\", surface_code = 12 }"));
+    let wall = &named.materials[0];
+    assert_eq!((wall.of.as_str(), wall.name.as_str(), wall.surface_code), ("building_wall", "plaster", Some(12)));
+    assert_eq!((named.materials[1].name.as_str(), named.materials[1].feature_id), ("leaves", None));
+    let text = named.canonical_text();
+    assert_eq!(job(&text).materials, named.materials, "{text}");
+    assert!(deciding_lines(&text).eq(deciding_lines(&job(SHORTEST).canonical_text())));
+    for (materials, expected) in [
+        ("wood_tip = \"leaves\"", ["exports.materials.wood_tip", "did you mean \"wood_top\"?"]),
+        ("wood_top = \"a b\"", ["exports.materials.wood_top: found \"a b\"", "no other names"]),
+        ("wood_top = 3", ["exports.materials.wood_top: found the whole number 3", "for example"]),
+        (
+            "wood_top = { name = \"a\", code = 3 }",
+            ["exports.materials.wood_top.code", "name, surface_code, feature_id"],
+        ),
+        ("wood_top = { surface_code = 3 }", ["exports.materials.wood_top.name", "found nothing"]),
+        ("wood_top = { name = \"a\", feature_id = 40000 }", ["feature_id: found 40000", "0 to 32767"]),
+    ] {
+        let told = Job::from_text(&with(materials), Path::new("x.toml")).unwrap_err();
+        let told = format!("{told} {}", told.hint());
+        assert!(expected.iter().all(|part| told.contains(part)), "{materials}: {told}");
+    }
 }
 
 #[test]

@@ -9,10 +9,10 @@ use clap::Args;
 use exports::{Block, CARRIES, Datum, ExportError, Facts, LEFT_OUT, Levels, Mesh, Product, Textures, WebMap, Work};
 use job::Job;
 use store::Folder;
-use terrain::{ModuleId, PostRect};
+use terrain::{MaterialName, ModuleId, PostRect};
 use views::grouped;
 
-use super::export_formats::{Format, HeightEncoding, HeightmapEngine, Layer};
+use super::export_formats::{Format, HeightEncoding, HeightmapEngine, Layer, TextureFile};
 use super::export_together::Several;
 use crate::arguments::{MeshOrigin, Workers, row_col};
 use crate::failure::{Failure, Outcome};
@@ -34,9 +34,8 @@ Examples:
   tiefort export ntc.tdb --format terrain-rgb --out ntc.pmtiles
   tiefort export ntc.tdb --format heightmap --engine unity --out ntc_unity
 
---lod K exports a coarser level, where the job has [lod] levels. Without it
-files of modules hold all levels; 3dtiles puts levels coarser than K between a
-square of 4 km and its load modules. A mesh (ply, obj, glb) is counted in metres
+--lod K exports a coarser level alone, where the job has [lod] levels; 3dtiles
+and 3tz go on to those coarser than K. A mesh (ply, obj, glb) is counted in metres
 from the south-west corner of what is exported, as usd and gazebo are; the file
 itself, or NAME.json beside it, says where that is. Load modules are named
 ROW,COL from the south-west, nodes of a glb r0003c0017. A geotiff is cloud
@@ -72,7 +71,8 @@ pub struct Arguments {
     /// The south-west and north-east load module of a block, or a single one [default: the whole area]
     #[arg(long, value_name = "ROW,COL..ROW,COL", value_parser = block)]
     modules: Option<Block>,
-    /// Level of detail, 0 being the finest [default: 0; for modules and 3dtiles all that the database has]
+    /// Level of detail, 0 being the finest [default: all that the database has where the format has room for them, as
+    /// the table below says, else 0]
     #[arg(long, value_name = "K")]
     lod: Option<usize>,
     /// What coordinates are counted from; for ply and obj only
@@ -111,6 +111,9 @@ pub struct Arguments {
     /// Metres of a texel, or more where its texture would be too large [default: that of the finest orthophoto]
     #[arg(long, value_name = "M", value_parser = texel_m, requires = "imagery")]
     texel_m: Option<f64>,
+    /// What kind of file a texture is; rgb, SGI's, for openflight only
+    #[arg(long, value_enum, default_value_t = TextureFile::Jpeg, requires = "imagery")]
+    texture: TextureFile,
     /// Texels along a side of a texture at most
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u16).range(16..=16384))]
     texture_max: u16,
@@ -228,6 +231,10 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
         let message = format!("found --imagery with a format that has no textures, expected one of {expected}");
         return Err(Failure::new(message, "leave --imagery out, or choose one of these formats"));
     }
+    if arguments.texture == TextureFile::Rgb && arguments.format != Format::Openflight {
+        let message = "found --texture rgb with another format than openflight, expected jpeg or png";
+        return Err(Failure::new(message, "leave --texture out, or add --format openflight"));
+    }
     let (is_heightmap, is_map) = (arguments.format == Format::Heightmap, arguments.format == Format::TerrainRgb);
     if !is_heightmap && arguments.engine != HeightmapEngine::Unreal {
         let message = "found --engine with another format than heightmap, expected none";
@@ -260,10 +267,10 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
     files::check_writable(&arguments.out)
 }
 
-/// The levels that a format has room for: a tileset goes on to coarser ones.
+/// The levels that a format has room for: where none is named all of them, and a tileset goes on to coarser ones.
 fn levels(arguments: &Arguments) -> Levels {
     match (arguments.format, arguments.lod) {
-        (Format::Modules, None) => Levels::From(0),
+        (Format::Modules | Format::Glb | Format::Openflight | Format::Usd, None) => Levels::From(0),
         (Format::Tiles3d | Format::Archive, level) => Levels::From(level.unwrap_or(0)),
         (_, level) => Levels::One(level.unwrap_or(0)),
     }
@@ -310,9 +317,21 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
 fn prepared(arguments: &Arguments, database: &Path, work: &Work) -> Result<Product, Failure> {
     let mut product = Product::read(database, arguments.modules, levels(arguments), work)?;
     product.has_ribbons = arguments.ribbons;
-    product.name_materials(arguments.materials.clone())?;
+    product.name_materials(materials(arguments, database, &product)?)?;
     open_imagery(arguments, &mut product)?;
     Ok(product)
+}
+
+/// What materials are called: as the job says, and before that as the arguments say.
+fn materials(arguments: &Arguments, database: &Path, product: &Product) -> Result<Vec<MaterialName>, Failure> {
+    let mut materials = Job::from_text(&product.manifest.job, database)?.materials;
+    for (of, name) in arguments.materials.iter().cloned() {
+        match materials.iter_mut().find(|named| named.of == of) {
+            Some(named) => named.name = name,
+            None => materials.push(MaterialName { of, name, ..MaterialName::default() }),
+        }
+    }
+    Ok(materials)
 }
 
 /// Lays orthophotos over what is exported, where some are named.
@@ -323,7 +342,8 @@ fn open_imagery(arguments: &Arguments, product: &mut Product) -> Result<(), Fail
     let rect = product.rect;
     let ends = [product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east)];
     let most = usize::from(arguments.texture_max);
-    let textures = Textures::open(&arguments.imagery, product.crs(), ends, arguments.texel_m, most)?;
+    let file = (arguments.texture.into(), most);
+    let textures = Textures::open(&arguments.imagery, product.crs(), ends, arguments.texel_m, file)?;
     product.textures = Some(Arc::new(textures));
     Ok(())
 }
@@ -363,7 +383,11 @@ fn summary(format: Format, product: &Product, said: Option<Datum>) -> String {
         0 => String::new(),
         count => format!("{} objects are {}\n", grouped(count as u64), carries.objects),
     };
-    format!("{said}{holes}{decks}{ribbons}{objects}{modules}, {} triangles{level}", grouped(triangles as u64))
+    let coarser = product.textures.as_ref().and_then(|textures| textures.coarser_m());
+    let texels = coarser.map_or_else(String::new, |[wanted_m, found_m]| {
+        format!("texels have up to {found_m:.2} m, not {wanted_m:.2} m: textures hold no more, see --texture-max\n")
+    });
+    format!("{said}{holes}{decks}{ribbons}{objects}{texels}{modules}, {} triangles{level}", grouped(triangles as u64))
 }
 
 /// Writes what is one file for globes; what was done to heights.
@@ -428,7 +452,8 @@ fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
         _ => Facts::z_up(product, coordinates),
     };
     let texture = product.texture(product.rect, 0.0)?;
-    let photo = arguments.out.with_extension("jpg");
+    let extension = product.textures.as_ref().map_or("", |textures| textures.extension());
+    let photo = arguments.out.with_extension(extension);
     let photo_name = texture.as_ref().and(photo.file_name()).map(|name| name.to_string_lossy().into_owned());
     let is_obj = arguments.format == Format::Obj;
     let materials = exports::obj_materials(product, &mesh, photo_name.as_deref()).filter(|_| is_obj);
@@ -440,7 +465,7 @@ fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
         _ => exports::write_ply(out, product, &mesh, coordinates),
     })?;
     if let Some(texture) = texture.filter(|_| is_obj) {
-        files::write_whole(&photo, |out| std::io::Write::write_all(out, &texture.jpeg))?;
+        files::write_whole(&photo, |out| std::io::Write::write_all(out, &texture.bytes))?;
     }
     if let Some(text) = materials {
         files::write_whole(&beside_it, |out| std::io::Write::write_all(out, text.as_bytes()))?;

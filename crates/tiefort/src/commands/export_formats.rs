@@ -68,6 +68,26 @@ pub(super) enum HeightEncoding {
     Terrarium,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum TextureFile {
+    /// JPEG
+    Jpeg,
+    /// PNG, which loses nothing
+    Png,
+    /// SGI's RGB, not compressed, for image generators
+    Rgb,
+}
+
+impl From<TextureFile> for exports::TextureFile {
+    fn from(file: TextureFile) -> Self {
+        match file {
+            TextureFile::Jpeg => exports::TextureFile::Jpeg,
+            TextureFile::Png => exports::TextureFile::Png,
+            TextureFile::Rgb => exports::TextureFile::Rgb,
+        }
+    }
+}
+
 impl From<HeightEncoding> for exports::HeightEncoding {
     fn from(encoding: HeightEncoding) -> Self {
         match encoding {

@@ -181,6 +181,11 @@ fn what_cannot_be_exported_is_refused() {
     refuses(&["terrain-rgb", "--size", "505", "--out", "new.pmtiles"], &["505 pixels", "256 or 512"]);
     refuses(&["terrain-rgb", "--out", "new.png"], &["\"png\"", "\"mbtiles\" or \"pmtiles\""]);
     refuses(&["mbtiles", "--encoding", "terrarium", "--out", "new.mbtiles"], &["--encoding"]);
+    fs::write(scene.path("text.tif"), "text").unwrap();
+    refuses(&["glb", "--imagery", "text.tif", "--out", "new.glb"], &["a text file, not a raster"]);
+    let rgb = ["glb", "--imagery", "text.tif", "--texture", "rgb", "--out", "new.glb"];
+    refuses(&rgb, &["--texture rgb", "openflight"]);
+    refuses(&["glb", "--material", "prim=a", "--out", "new.glb"], &["\"prim\"", "building_wall"]);
     refuses(&["3tz", "--out", "tiles.zip"], &["\"zip\"", "\"3tz\""]);
     for (format, name) in [("3dtiles", "new"), ("quantized-mesh", "new"), ("3tz", "a.3tz"), ("mbtiles", "a.mbtiles")] {
         refuses(&[format, "--out", name], &["unknown datum", "EGM96"]);
@@ -188,6 +193,28 @@ fn what_cannot_be_exported_is_refused() {
     scene.refuses(&["export", "none.tdb", "--format", "ply", "--out", "mesh.ply"], &["none.tdb"]);
     let said = scene.run_to(2, &["export", "a.tdb", "--format", "3dtiles", "--assume-datum", "sea", "--out", "new"]);
     assert!(said.stderr.contains("expected EGM96"), "{}", said.stderr);
+}
+
+#[test]
+fn materials_are_called_as_the_job_says_without_building_again() {
+    let scene = built();
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    let codes = "name = \"gravel\", surface_code = 77, feature_id = 12";
+    let named = format!("\n[exports.materials]\ndefault = {{ {codes} }}\nmountains = {{ {codes} }}\n");
+    fs::write(scene.path("job.toml"), job + &named).unwrap();
+    let before = everything_below(&scene.path("a.tdb/modules"));
+    let said = scene.run_to(0, &["build", "job.toml", "--out", "a.tdb"]).stderr;
+    assert!(before == everything_below(&scene.path("a.tdb/modules")), "{said}");
+    let square = |more: &[&str], out: &str| {
+        scene.run_to(0, &[&["export", "a.tdb", "--format", "openflight", "--out", out], more].concat());
+        fs::read(scene.path(out).join("squares/r00c00.flt")).unwrap()
+    };
+    let has = |bytes: &[u8], part: &[u8]| bytes.windows(part.len()).any(|window| window == part);
+    let (job_says, said) =
+        (square(&[], "one"), square(&["--material", "default=sand", "--material", "mountains=sand"], "two"));
+    assert!(has(&job_says, b"gravel\0") && has(&said, b"sand\0") && !has(&said, b"gravel"));
+    // Both codes of a face, which the argument leaves as they are.
+    [job_says, said].iter().for_each(|bytes| assert!(has(bytes, &[0, 77, 0, 12])));
 }
 
 #[test]

@@ -72,7 +72,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "[importence]",
         &[
             "a/b.toml:9: importence: found a section or key that no job has, expected one of [area], [dem],",
-            "[importance], [features], [objects], [tiles], [load_modules], [limits], [tin], [lod]",
+            "[importance], [features], [objects], [tiles], [load_modules], [limits], [tin], [lod], [exports]",
             "hint: did you mean [importance]?",
         ],
     );
@@ -101,7 +101,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "workers = 2\n[area]",
         &[
             "a/b.toml:1: workers: found a section or key that no job has, expected one of [area], [dem],",
-            "[importance], [features], [objects], [tiles], [load_modules], [limits], [tin], [lod]",
+            "[importance], [features], [objects], [tiles], [load_modules], [limits], [tin], [lod], [exports]",
             "hint: give it on the command line: --workers",
         ],
     );
@@ -110,7 +110,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         "[sample]\nseed = 2\n[dem]",
         &[
             "a/b.toml:7: sample: found a section or key that no job has, expected one of [area], [dem],",
-            "[importance], [features], [objects], [tiles], [load_modules], [limits], [tin], [lod]",
+            "[importance], [features], [objects], [tiles], [load_modules], [limits], [tin], [lod], [exports]",
             r#"hint: the sample terrain is chosen by source = "sample" and seed in [dem]"#,
         ],
     );
