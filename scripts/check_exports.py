@@ -681,8 +681,10 @@ def check_flt_levels(folder, levels, scratch):
     for square in sorted((folder / "squares").glob("*.flt")):
         out = scratch / "square.osgt"
         subprocess.run(["osgconv", str(square), str(out)], capture_output=True, check=True)
-        found = re.findall(r"RangeList \d+ \{\s+([-\d.e+]+) ([-\d.e+]+)", out.read_text())
-        ranges.append([tuple(map(float, pair)) for pair in found])
+        # OSG leaves out a square that is all hole.
+        for found in re.findall(r"RangeList \d+ \{([^}]*)\}", out.read_text()):
+            numbers = [float(number) for number in found.split()]
+            ranges.append(list(zip(numbers[::2], numbers[1::2])))
     turns = all(far == near for of in ranges for (_, far), (near, _) in zip(of, of[1:]))
     sound = all(len(of) == levels and of[0][0] == 0 for of in ranges)
     expect(sound and turns, f"OSG shows {levels} levels of each square, one after the other: {ranges[0]}")
