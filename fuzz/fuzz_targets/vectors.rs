@@ -1,4 +1,4 @@
-//! Lines and polygons: OpenStreetMap data, GeoPackages, Shapefiles, GeoJSON.
+//! Lines and polygons: OpenStreetMap data, GeoPackages, Shapefiles, GeoJSON, GeoParquet.
 #![no_main]
 
 use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, VectorShape, Wanted, read_features};

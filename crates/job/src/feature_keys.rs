@@ -73,7 +73,7 @@ pub(crate) const FEATURES: &[Key] = &[
 ];
 
 pub(crate) const FEATURE_SOURCES: &[Key] = &[
-    Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile or GeoJSON")
+    Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON or GeoParquet")
         .form("the path of a file of lines and polygons")
         .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
     Key::new("layer", "its layer")

@@ -44,7 +44,9 @@ pub fn check_address(address: &str) -> Result<(), &'static str> {
         return Err("an address without a name and a password in it");
     }
     let is_plain = !address.contains(|c: char| c.is_control() || c.is_whitespace() || c == '"' || c == '\\');
-    if host.is_empty() || path.is_empty() || path.ends_with('/') || !is_plain || path.contains(['*', '[']) {
+    // Only buckets list what they have.
+    let is_pattern = path.contains('[') || scheme != "s3" && path.contains('*');
+    if host.is_empty() || path.is_empty() || path.ends_with('/') || !is_plain || is_pattern || host.contains('*') {
         return Err(ADDRESS);
     }
     if scheme == "http" && !is_loopback(host) {
@@ -72,6 +74,7 @@ mod tests {
             assert_eq!(check_address(good), Ok(()), "{good}");
         }
         assert_eq!(check_address("http://[::1]:8080/x.tif"), Ok(()));
+        assert_eq!(check_address("s3://b/type=segment/*"), Ok(()));
         for bad in [
             "http://a.org/x.tif",
             "ftp://a.org/x",

@@ -194,7 +194,7 @@ pub enum SourceError {
     /// The file is in none of the formats that features are read from.
     #[error(
         "{path}: {found}, which is not read as features; \
-        expected OpenStreetMap (.osm.pbf), a GeoPackage, a Shapefile or GeoJSON"
+        expected OpenStreetMap (.osm.pbf), a GeoPackage, a Shapefile, GeoJSON or GeoParquet"
     )]
     NotFeatures { path: PathBuf, found: String },
     /// The system of the file's coordinates cannot be computed, and nothing else says what it is.

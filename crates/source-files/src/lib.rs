@@ -59,12 +59,18 @@ pub use classes::ClassRaster;
 mod imagery;
 pub use imagery::{Imagery, Keep, Square};
 mod geopackage;
+#[cfg(feature = "geoparquet")]
+mod geoparquet;
+#[cfg(feature = "geoparquet")]
+pub use geoparquet::GeoParquet;
 mod kept;
 mod polygons;
 mod shapefile;
 mod shapefile_parts;
 pub use polygons::read_polygons;
 mod features;
+#[cfg(feature = "geoparquet")]
+pub use features::groups_near;
 pub use features::{
     BUILT_IN_KEYS, Done, Extent, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted,
     feature_attribution, feature_layers, is_feature_file, read_features,

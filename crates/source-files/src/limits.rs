@@ -56,3 +56,11 @@ pub const REMARKS_MAX: usize = 10_000;
 pub const RINGS_MAX: usize = 1 << 14;
 /// Bytes of a Shapefile's shapes, and of its table: both are held in memory while features are read.
 pub const SHAPEFILE_BYTES_MAX: u64 = 512 << 20;
+/// Bytes of the footer of a Parquet file: those of Overture, with some hundred row groups, have some millions.
+pub const PARQUET_FOOTER_BYTES_MAX: u64 = 64 << 20;
+/// Bytes of a page of a Parquet file once unpacked: pages have a million, but some writers make one of a column.
+pub const PARQUET_PAGE_BYTES_MAX: u64 = 1 << 28;
+/// Values of the columns of a Parquet file that are read, whatever its size.
+pub const PARQUET_VALUES_FREE: u64 = 1 << 20;
+/// Values beside that for each byte of it: absent ones take hardly any, but each row has a geometry.
+pub const PARQUET_VALUES_A_BYTE: u64 = 4;

@@ -28,7 +28,10 @@ const GEO_KEYS: u16 = 34735;
 const PLACE: [u16; 8] = [PIXEL_SCALE, TIE_POINT, TRANSFORMATION, GEO_KEYS, 34736, 34737, 42112, 42113];
 /// Places of other directories, which are not copied.
 const POINTERS: [u16; 4] = [330, 34665, 34853, 40965];
-/// Kinds of values: 32 bits, 64 bits, doubles.
+const NODATA: u16 = 42113;
+const SAMPLE_FORMAT: u16 = 339;
+/// Kinds of values: text, 32 bits, 64 bits, doubles.
+const ASCII: u16 = 2;
 const LONG: u16 = 4;
 const LONG8: u16 = 16;
 const DOUBLE: u16 = 12;
@@ -188,6 +191,13 @@ impl TiffLevels {
             let mut bytes = Vec::with_capacity(numbers.len() * size);
             numbers.iter().for_each(|&number| self.put(&mut bytes, number, size));
             tags.push(RawTag { tag, kind, count: numbers.len() as u64, bytes });
+        }
+        // What is left out would be 0 for readers of sparse files; as no number it is no ground. Whole numbers have no
+        // such value, and a file that leaves something out itself means what it says.
+        let is_of = |tag: u16| own.tags.iter().chain(&whole.tags).find(|own| own.tag == tag);
+        let is_float = is_of(SAMPLE_FORMAT).is_some_and(|tag| number(self.is_little, &tag.bytes) == 3);
+        if is_float && is_of(NODATA).is_none() && own.chunks.iter().all(|&(_, size)| 0 < size) {
+            tags.push(RawTag { tag: NODATA, kind: ASCII, count: 4, bytes: b"nan\0".to_vec() });
         }
         tags.sort_by_key(|tag| tag.tag);
         tags

@@ -27,16 +27,21 @@ impl SystemClock {
     }
 }
 
+/// Seconds since the beginning of 1970.
+#[cfg(feature = "fetch")]
+pub fn now() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
+}
+
 /// The day it is, in UTC, as `2026-11-25`.
 #[cfg(feature = "fetch")]
 pub fn today() -> String {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    day_text(since / 86_400)
+    day_text(now() / 86_400)
 }
 
 /// A day since the beginning of 1970. Years begin in March here, so that leap days end them.
 #[cfg(feature = "fetch")]
-fn day_text(days: u64) -> String {
+pub fn day_text(days: u64) -> String {
     let shifted = days + 719_468;
     let (era, day) = (shifted / 146_097, shifted % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;

@@ -42,6 +42,8 @@ pub use records::{records, states};
 mod locate;
 pub use locate::{Corner, corners, covered, find_area, rectangle_around, utm_of};
 mod needed;
+#[cfg(feature = "geoparquet")]
+pub use needed::groups_needed;
 pub use needed::{Needed, needed};
 mod features_seen;
 pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, features_in};

@@ -1,13 +1,17 @@
-//! What of a raster an area needs: before it is fetched, its directory says so.
+//! What of a file an area needs: before it is fetched, its directory or footer says so.
 
 use std::path::Path;
 
 use job::{Job, SourceFile};
 use source_files::DemFile;
+#[cfg(feature = "geoparquet")]
+use source_files::{Crs, GeoParquet, Wanted, groups_near};
 use terrain::GridFrame;
 
 use crate::ground::GroundError;
 use crate::ground::source::{area_crs, reading};
+#[cfg(feature = "geoparquet")]
+use crate::ground::{area::GamingArea, vectors::bounds};
 
 /// What of a raster an area needs.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,4 +44,17 @@ pub fn needed(job: &Job, file: &SourceFile, path: &Path) -> Result<Needed, Groun
         }
     };
     Ok(Needed { chunks, spacing_m })
+}
+
+/// The row groups of a GeoParquet file that the area of a job needs; `crs` is its system where the job says one.
+///
+/// # Errors
+/// When the area cannot be planned, or coordinates of the file cannot be brought to its system.
+#[cfg(feature = "geoparquet")]
+pub fn groups_needed(job: &Job, file: &GeoParquet, crs: Option<&Crs>) -> Result<Vec<usize>, GroundError> {
+    let area = GamingArea::new(job)?;
+    let bounds = bounds(&area, [area.frame.origin_east_m, area.frame.origin_north_m]);
+    let epsg = job.area.epsg;
+    let wanted = Wanted { epsg, bounds, layer: None, crs, keys: &[], buildings: false, points: true };
+    Ok(groups_near(file, &wanted)?)
 }

@@ -19,6 +19,8 @@ pub(super) enum Format {
     GeoPackage,
     Shapefile,
     GeoJson,
+    #[cfg(feature = "geoparquet")]
+    GeoParquet,
 }
 
 /// Whether the file at `path` begins as one of the formats of features does; `false` where it cannot be read. Not all
@@ -42,7 +44,12 @@ fn is_zip(path: &Path) -> bool {
 
 /// Whom to name beside anything drawn from the file at `path`, where its format says so.
 pub fn feature_attribution(path: &Path) -> Option<&'static str> {
-    open(path).is_ok_and(|(_, format)| format == Format::OpenStreetMap).then_some(ATTRIBUTION)
+    match open(path).ok()? {
+        (_, Format::OpenStreetMap) => Some(ATTRIBUTION),
+        #[cfg(feature = "geoparquet")]
+        (store, Format::GeoParquet) => super::columnar::attribution(&super::columnar::footer(&store).ok()?),
+        _ => None,
+    }
 }
 
 /// The layers of features in the GeoPackage at `path`; none where it is a file of another format.
@@ -91,6 +98,10 @@ pub(super) fn open(path: &Path) -> Result<(Store, Format), SourceError> {
     if is_json(&start) {
         return Ok((store, Format::GeoJson));
     }
+    #[cfg(feature = "geoparquet")]
+    if start.starts_with(crate::geoparquet::MARK) {
+        return Ok((store, Format::GeoParquet));
+    }
     Err(refused(path, &name_of(path, &start)))
 }
 
@@ -106,7 +117,7 @@ fn is_json(start: &[u8]) -> bool {
 
 /// What a file is that is not read.
 fn name_of(path: &Path, start: &[u8]) -> String {
-    const MARKS: [(&[u8], &str); 7] = [
+    const MARKS: [(&[u8], &str); 8] = [
         (b"II\x2a\0", "a GeoTIFF raster"),
         (b"MM\0\x2a", "a GeoTIFF raster"),
         (b"II\x2b\0", "a GeoTIFF raster"),
@@ -114,6 +125,7 @@ fn name_of(path: &Path, start: &[u8]) -> String {
         (b"UHL1", "a DTED raster"),
         (b"BZh", "a bzip2 file"),
         (b"fgb\x03", "a FlatGeobuf file"),
+        (b"PAR1", "a Parquet file, which this program was built without"),
     ];
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
     let text = String::from_utf8_lossy(start);

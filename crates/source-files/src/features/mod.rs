@@ -1,5 +1,5 @@
-//! Roads, rivers, lakes and other lines and polygons: from OpenStreetMap data, GeoPackages, Shapefiles and GeoJSON,
-//! in metres of the area's system.
+//! Roads, rivers, lakes and other lines and polygons: from OpenStreetMap data, GeoPackages, Shapefiles, GeoJSON
+//! and GeoParquet, in metres of the area's system.
 //!
 //! Features are read as they are: nothing is mended here. They are cut at the bounds that the caller names, one load
 //! module beyond the area, so that memory is bounded by what lies in the area; inside, every vertex of the file is
@@ -7,6 +7,8 @@
 //! file that cannot be read at all is an error.
 
 mod clip;
+#[cfg(feature = "geoparquet")]
+mod columnar;
 mod columns;
 mod formats;
 mod json;
@@ -14,6 +16,8 @@ mod loose;
 mod model;
 mod nest;
 pub(crate) mod osm;
+#[cfg(feature = "geoparquet")]
+mod overture;
 mod packages;
 mod placing;
 pub(crate) mod raw;
@@ -21,6 +25,8 @@ mod shapes;
 pub(crate) mod well_known;
 
 pub use clip::Extent;
+#[cfg(feature = "geoparquet")]
+pub use columnar::groups_near;
 pub use formats::{feature_attribution, feature_layers, is_feature_file};
 pub use model::{BUILT_IN_KEYS, Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 
@@ -51,6 +57,8 @@ pub fn read_features(path: &Path, wanted: &Wanted, each: Each) -> Result<Feature
         Format::GeoPackage => packages::read(path, wanted),
         Format::Shapefile => shapes::read(&store, wanted),
         Format::GeoJson => json::read(&store, wanted),
+        #[cfg(feature = "geoparquet")]
+        Format::GeoParquet => columnar::read(&store, wanted),
     };
     let with_buildings = |mut read: FeatureFile| {
         if wanted.buildings && format != Format::OpenStreetMap {

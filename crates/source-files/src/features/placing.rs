@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::clip::{self, Extent, Vertex};
 use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
-use super::raw::{Part, RawFeature};
+use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;
@@ -136,6 +136,23 @@ impl Placing {
     pub(super) fn within(&self, metres: f64) -> Extent {
         let bounds = self.bounds.grown(metres);
         if self.is_same { bounds } else { seen_in(&self.area, &self.source, &bounds) }
+    }
+
+    /// Whether something with this extent may lie near the area.
+    pub(super) fn is_near(&self, extent: &Extent) -> bool {
+        self.turned(extent).is_some()
+    }
+
+    /// Whether a shape may lie near the area, or has something that is to be told; counts one that does not.
+    pub(super) fn is_shape_near(&mut self, shape: &RawShape) -> bool {
+        let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
+        let is_odd = shape.parts.is_empty() || shape.vertices().any(|vertex| !self.is_on_earth(vertex));
+        if is_odd || self.is_near(&extent) {
+            return true;
+        }
+        self.lies_over(&extent);
+        self.count_outside(1);
+        false
     }
 
     /// Tells where things of the file lie that are not placed.

@@ -16,7 +16,14 @@ pub(crate) fn geometry(blob: &[u8]) -> Result<RawShape, String> {
         4 => 8,
         other => return Err(format!("a geometry with a box of kind {other}")),
     };
-    let bytes = blob.get(8 + 8 * numbers..).ok_or_else(cut_short)?;
+    binary(blob.get(8 + 8 * numbers..).ok_or_else(cut_short)?)
+}
+
+/// The points, lines and polygons of well-known binary, as the standard or PostGIS writes it.
+///
+/// # Errors
+/// In words, what it is instead of a geometry.
+pub(crate) fn binary(bytes: &[u8]) -> Result<RawShape, String> {
     let mut binary = Binary { bytes, at: 0, shape: RawShape::default() };
     binary.add(0)?;
     Ok(binary.shape)

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod formats;
+#[cfg(feature = "geoparquet")]
+mod geoparquet;
 mod geotiff;
 mod hostile;
 mod mosaics;

@@ -12,10 +12,12 @@ Examples:
   tiefort fetch irwin.toml && tiefort build irwin.toml
 
 Addresses (https://, s3://) stand in a job in the place of paths. Of a GeoTIFF
-come the tiles under the area and around it, of everything else the whole file,
-into NAME.sources/ beside NAME.toml; NAME.lock says what came. Where the posts
-of an overview are no farther apart than the job's spacing, the overview comes.
-A fetch that was cut goes on where it was. A build touches no network.";
+come the tiles under the area and around it, of GeoParquet the row groups that
+meet it, of everything else the whole file, into NAME.sources/ beside NAME.toml;
+NAME.lock says what came. Where the posts of an overview are no farther apart
+than the job's spacing, the overview comes. A * in the name of a bucket's files
+stands for all GeoParquet that fits. A fetch that was cut goes on where it was.
+A build touches no network.";
 
 /// Arguments of `fetch`.
 #[derive(Args)]

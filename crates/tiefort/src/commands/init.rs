@@ -21,6 +21,7 @@ Examples:
   tiefort init grid.asc --crs EPSG:32611
   tiefort init dem.tif roads.osm.pbf lakes.gpkg --out mine.toml
   tiefort init --around 35.3,-116.6 --km 50 --dem glo30 --out irwin.toml
+  tiefort init --around 35.3,-116.6 --dem 3dep13 --vectors overture --release R
 
 The job covers the largest rectangle of whole load modules inside the rasters.
 Roads, rivers and lakes become parts of the ground there, buildings, walls and
@@ -31,7 +32,7 @@ woods stand on it.";
 #[command(after_help = AFTER_HELP)]
 pub struct Arguments {
     /// Rasters, or folders of them: GeoTIFF, DTED, HGT, Esri ASCII, raw with a .hdr; also in .gz and .zip; in order of
-    /// priority. Roads, water, buildings and woods: .osm.pbf, GeoPackage, Shapefile, GeoJSON
+    /// priority. Roads, water, buildings and woods: .osm.pbf, GeoPackage, Shapefile, GeoJSON, GeoParquet
     #[arg(value_name = "FILES", required_unless_present = "around", conflicts_with = "around")]
     files: Vec<PathBuf>,
     /// Latitude and longitude in degrees: an area around that place, with heights that `tiefort fetch` brings
@@ -44,6 +45,12 @@ pub struct Arguments {
     /// Which heights, by a name that `tiefort sources` lists
     #[arg(long, value_name = "NAME", requires = "around")]
     dem: Option<String>,
+    /// Which roads, water and buildings, by a name that `tiefort sources` lists
+    #[arg(long, value_name = "NAME", requires = "around")]
+    vectors: Option<String>,
+    /// Which release of them
+    #[arg(long, value_name = "RELEASE", requires = "vectors")]
+    release: Option<String>,
     /// A file with sources of your own
     #[arg(long, value_name = "FILE.toml", requires = "around")]
     catalogue: Option<PathBuf>,
@@ -151,8 +158,9 @@ fn around(arguments: &Arguments, place: [f64; 2], dem: &str) -> Result<Outcome, 
     let limits = Limits::of(arguments.mean.unwrap_or(BUDGETS[0]));
     let name = arguments.out.as_deref().and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned());
     let name = plain_name(&name.unwrap_or_default());
-    let source = (dem, arguments.catalogue.as_deref());
-    let text = init_around::job_text(place, arguments.km, source, &limits, &name)?;
+    let (vectors, release) = (arguments.vectors.as_deref(), arguments.release.as_deref());
+    let named = init_around::Named { dem, vectors, release, own: arguments.catalogue.as_deref() };
+    let text = init_around::job_text(place, arguments.km, &named, &limits, &name)?;
     let Some(out) = &arguments.out else {
         terminal::print(&text)?;
         return Ok(Outcome::Sound);
@@ -166,7 +174,7 @@ fn around(arguments: &Arguments, place: [f64; 2], dem: &str) -> Result<Outcome, 
 /// The files named, and the rasters and files of features directly in the folders named, by name.
 fn named_files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     const ENDINGS: [&str; 12] = ["tif", "tiff", "dt0", "dt1", "dt2", "hgt", "asc", "flt", "bil", "img", "zip", "gz"];
-    const OF_FEATURES: [&str; 5] = ["pbf", "gpkg", "shp", "geojson", "json"];
+    const OF_FEATURES: [&str; 7] = ["pbf", "gpkg", "shp", "geojson", "json", "parquet", "geoparquet"];
     let mut all = Vec::new();
     for path in named {
         if !path.is_dir() {

@@ -6,7 +6,7 @@ use build::ground::find_area;
 use job::{AreaPlace, AreaRequest, Job};
 use terrain::Spacing;
 
-use crate::catalogue::{Entry, catalogue, named};
+use crate::catalogue::{Entry, Vectors, catalogue};
 use crate::commands::init_limits::Limits;
 use crate::commands::job_words::quoted;
 use crate::failure::Failure;
@@ -24,6 +24,18 @@ pub fn place(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
+/// What the words of the command name.
+pub struct Named<'a> {
+    /// A source of heights.
+    pub dem: &'a str,
+    /// A source of lines and polygons.
+    pub vectors: Option<&'a str>,
+    /// Which release of that.
+    pub release: Option<&'a str>,
+    /// A file with sources of one's own.
+    pub own: Option<&'a Path>,
+}
+
 /// The text of a job called `name` around a place; the side of its area is `km` long.
 ///
 /// # Errors
@@ -31,12 +43,16 @@ pub fn place(text: &str) -> Result<[f64; 2], String> {
 pub fn job_text(
     [latitude, longitude]: [f64; 2],
     km: f64,
-    (dem, own): (&str, Option<&Path>),
+    Named { dem, vectors, release, own }: &Named,
     limits: &Limits,
     name: &str,
 ) -> Result<String, Failure> {
-    let entries = catalogue(own)?;
-    let entry = named(&entries, dem)?;
+    let known = catalogue(*own)?;
+    let entry = known.heights(dem)?;
+    let vectors = match vectors {
+        Some(name) => vectors_text(known.vectors(name)?, *release, entry)?,
+        None => String::new(),
+    };
     if entry.address.is_none() {
         return Err(Failure::new(format!("--dem {dem}: {}", entry.title), entry.ask.clone()));
     }
@@ -77,7 +93,7 @@ pub fn job_text(
          # `tiefort build` then touches no network.\n\n{area}\n[dem]\n\
          # {}: {}\nsources = [\n{}]\nvoids = {{ next_source = true, fill_within_posts = 8 }}\n\
          vertical_datum = {}\n\n[limits]\nper_load_module = {}         # triangles\n\
-         mean_per_load_module = {}\nper_4km_square = {}\n\n[tin]\nmethod = \"optimised\"\n",
+         mean_per_load_module = {}\nper_4km_square = {}\n\n[tin]\nmethod = \"optimised\"\n{vectors}",
         entry.title,
         entry.licence,
         sources.concat(),
@@ -86,6 +102,23 @@ pub fn job_text(
         limits.mean,
         limits.most[1],
     ))
+}
+
+/// The sections of features and objects. What stands on a surface model would count twice.
+fn vectors_text(vectors: &Vectors, release: Option<&str>, heights: &Entry) -> Result<String, Failure> {
+    let [features, objects] = vectors.of_release(release)?;
+    let is_surface = heights.model == "surface";
+    let section = |name: &str, all: &[String], sign: &str| {
+        let lines: String = all.iter().map(|address| format!("{sign}    {},\n", quoted(address))).collect();
+        if all.is_empty() { lines } else { format!("\n{sign}[{name}]\n{sign}sources = [\n{lines}{sign}]\n") }
+    };
+    let (title, licence) = (&vectors.title, &vectors.licence);
+    let note = match is_surface && !objects.is_empty() {
+        true => "\n# Roofs and crowns are in the heights of a surface model: what stands on it counts twice.",
+        false => "",
+    };
+    let objects = section("objects", &objects, if is_surface { "# " } else { "" });
+    Ok(format!("\n# {title}: {licence}{}{note}{objects}", section("features", &features, "")))
 }
 
 /// Lowest and highest longitude and latitude of an area and a little around it.

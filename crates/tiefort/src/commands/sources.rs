@@ -1,11 +1,11 @@
-//! `tiefort sources`: what heights of the Earth are known by name.
+//! `tiefort sources`: what heights, lines and polygons of the Earth are known by name.
 
 use std::path::PathBuf;
 
 use clap::Args;
 use views::{Align, Table};
 
-use crate::catalogue;
+use crate::catalogue::{self, Vectors};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -36,20 +36,27 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         terminal::print(catalogue::built_in())?;
         return Ok(Outcome::Sound);
     }
-    let entries = catalogue::catalogue(arguments.catalogue.as_deref())?;
+    let known = catalogue::catalogue(arguments.catalogue.as_deref())?;
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Left, Align::Left, Align::Left]);
     table.row(["name", "spacing", "model", "heights above", "what"]);
-    for entry in &entries {
+    for entry in &known.heights {
         let (spacing, datum) = (format!("{} m", entry.spacing_m), format!("{}, {}", entry.datum, entry.unit));
         table.row([&entry.name, &spacing, &entry.model, &datum, &entry.title]);
     }
+    for vectors in &known.vectors {
+        table.row([&vectors.name, "", "vectors", "", &vectors.title]);
+    }
     let mut text = table.text(0);
-    for entry in &entries {
+    for entry in &known.heights {
         let from = entry.address.as_ref().unwrap_or(&entry.ask);
         text += &format!(
             "\n{}: {}\n  licence: {}\n  attribution: {}\n",
             entry.name, from, entry.licence, entry.attribution
         );
+    }
+    for Vectors { name, ask, features, objects, licence, attribution, .. } in &known.vectors {
+        let addresses = features.iter().chain(objects).map(|address| format!("\n  {address}")).collect::<String>();
+        text += &format!("\n{name}: {ask}{addresses}\n  licence: {licence}\n  attribution: {attribution}\n");
     }
     terminal::print(&text)?;
     Ok(Outcome::Sound)

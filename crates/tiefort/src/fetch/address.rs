@@ -3,11 +3,14 @@
 use job::without_query;
 
 use super::fault::Fault;
+use super::s3::{Variable, bucket_url, encoded};
 
 /// An address that is asked for, which messages show without what follows its `?`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Address {
     url: String,
+    /// The bucket and the key, of a file that is named by them.
+    bucket: Option<(String, String)>,
 }
 
 impl Address {
@@ -15,17 +18,26 @@ impl Address {
     ///
     /// # Errors
     /// When the region or the endpoint of an `s3://` address makes no address that is followed.
-    pub fn of(named: &str, variable: &dyn Fn(&str) -> Option<String>) -> Result<Self, Fault> {
-        let url = match named.strip_prefix("s3://").and_then(|rest| rest.split_once('/')) {
-            None => named.to_owned(),
-            Some((bucket, key)) => match (variable("AWS_ENDPOINT_URL"), variable("AWS_REGION")) {
-                (Some(endpoint), _) => format!("{}/{bucket}/{key}", endpoint.trim_end_matches('/')),
-                (None, Some(region)) => format!("https://{bucket}.s3.{region}.amazonaws.com/{key}"),
-                // Buckets of other regions are told by a redirect.
-                (None, None) => format!("https://{bucket}.s3.amazonaws.com/{key}"),
-            },
-        };
-        Self::checked(url)
+    pub fn of(named: &str, variable: &Variable) -> Result<Self, Fault> {
+        match in_bucket(named) {
+            None => Self::checked(named.to_owned(), None),
+            Some((bucket, key)) => {
+                let url = format!("{}/{}", bucket_url(bucket, variable), encoded(key, "/"));
+                Self::checked(url, Some((bucket, key)))
+            }
+        }
+    }
+
+    /// What is asked for a list of the files of a bucket whose keys begin with `prefix`; `token` asks for those behind
+    /// what came before.
+    ///
+    /// # Errors
+    /// As [`Address::of`].
+    pub fn of_list(bucket: &str, prefix: &str, token: Option<&str>, variable: &Variable) -> Result<Self, Fault> {
+        let token = token.map(|token| format!("continuation-token={}&", encoded(token, ""))).unwrap_or_default();
+        let url = format!("{}/?{token}list-type=2&prefix={}", bucket_url(bucket, variable), encoded(prefix, ""));
+        // A list is of a folder, which no file is.
+        Self::checked(url.replace("/?", "/-?"), Some((bucket, prefix))).map(|address| Self { url, ..address })
     }
 
     /// Where a server sends a client on to.
@@ -44,12 +56,13 @@ impl Address {
         if is_less_safe || !url.starts_with("http") {
             return Err(Fault::last(format!("{self}: it leads on to {shown}, which is not followed")));
         }
-        Self::checked(url).map_err(|_| Fault::last(format!("{self}: it leads on to {shown}, which is not followed")))
+        Self::checked(url, None)
+            .map_err(|_| Fault::last(format!("{self}: it leads on to {shown}, which is not followed")))
     }
 
-    fn checked(url: String) -> Result<Self, Fault> {
+    fn checked(url: String, bucket: Option<(&str, &str)>) -> Result<Self, Fault> {
         match job::check_address(&url) {
-            Ok(()) => Ok(Self { url }),
+            Ok(()) => Ok(Self { url, bucket: bucket.map(|(name, key)| (name.to_owned(), key.to_owned())) }),
             Err(expected) => {
                 Err(Fault::last(format!("{}: found this address, expected {expected}", without_query(&url))))
             }
@@ -61,10 +74,25 @@ impl Address {
         &self.url
     }
 
+    /// The bucket that the job named it by, whose owner may want a signature.
+    pub fn bucket(&self) -> Option<&str> {
+        self.bucket.as_ref().map(|(name, _)| name.as_str())
+    }
+
+    /// Its key in the bucket; empty where it is not named by one.
+    pub fn key(&self) -> &str {
+        self.bucket.as_ref().map_or("", |(_, key)| key)
+    }
+
     /// Whether it is of this machine itself, where no proxy lies between.
     pub fn is_of_this_machine(&self) -> bool {
         self.url.starts_with("http://")
     }
+}
+
+/// The bucket and the key of an address of a bucket.
+pub fn in_bucket(named: &str) -> Option<(&str, &str)> {
+    named.strip_prefix("s3://").and_then(|rest| rest.split_once('/'))
 }
 
 impl std::fmt::Debug for Address {

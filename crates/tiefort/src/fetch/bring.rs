@@ -3,21 +3,18 @@
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use job::Locked;
-use schedule::{ScheduleError, Workers};
+use schedule::Workers;
+use source_files::GeoParquet;
 use store::engine::Fingerprint;
 
-use super::client::Client;
+use super::client::{Client, REQUESTS};
 use super::fault::Fault;
 use super::pieces::Piece;
-use super::plan::{Planned, What, disk};
+use super::plan::{Planned, What, disk, stopped_or};
 
-/// Requests at a time.
-const REQUESTS: usize = 8;
-
-/// Brings a file; `told` hears of every range, with the bytes that have come of the file.
+/// Brings a file; `told` hears of every range, with its bytes.
 ///
 /// # Errors
 /// When a range does not come, or cannot be written; those that came are kept.
@@ -31,6 +28,14 @@ pub fn bring(client: &Client, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> 
             let all = planned.pieces.iter().map(|piece| planned.store.read(*piece));
             write(&half, |out| all.into_iter().try_for_each(|bytes| out.write_all(&bytes?))).map_err(failed)?;
         }
+        What::Groups(files) => {
+            pieces(client, &planned, told)?;
+            let parts: Vec<_> = files.iter().map(|(file, groups)| (file, groups.clone())).collect();
+            let bytes = |part: usize, (start, len): (u64, u64)| {
+                planned.store.extent(&planned.pieces, (planned.remotes[part].base + start, len))
+            };
+            write(&half, |out| GeoParquet::write(&parts, out, bytes)).map_err(failed)?;
+        }
         What::Window { levels, level, chunks, .. } => {
             pieces(client, &planned, told)?;
             let bytes = |chunk| planned.store.extent(&planned.pieces, levels.chunk(*level, chunk));
@@ -42,6 +47,7 @@ pub fn bring(client: &Client, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> 
     fs::rename(&half, &planned.path).map_err(|error| disk(&planned.path, &error))?;
     let window = match &planned.what {
         What::Window { level, chunks, .. } => Some((*level as u64, chunks.len() as u64)),
+        What::Groups(files) => Some((0, files.iter().map(|(_, groups)| groups.len() as u64).sum())),
         What::Whole { .. } => None,
     };
     let Planned { written, path, etag, total, store, .. } = planned;
@@ -61,37 +67,28 @@ fn write(path: &Path, put: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) 
 
 /// Brings the ranges that are not there yet.
 fn pieces(client: &Client, planned: &Planned, told: &(dyn Fn(u64) + Sync)) -> Result<(), Fault> {
-    let (here, left): (Vec<Piece>, Vec<Piece>) = planned.pieces.iter().partition(|piece| planned.store.has(**piece));
-    let done = AtomicU64::new(here.iter().map(|piece| piece.len).sum());
+    let left: Vec<Piece> = planned.pieces.iter().filter(|piece| !planned.store.has(**piece)).copied().collect();
     let brought = schedule::for_each_independent(&left, &Workers::new(REQUESTS), client.stop(), |_, &piece| {
-        let answer = client.range(&planned.address, piece.start, piece.len, Some(&planned.etag))?;
-        if answer.bytes.len() as u64 != piece.len || answer.total != planned.total {
-            let text = format!("{}: it has {} bytes now, expected {}", planned.written, answer.total, planned.total);
+        let remote = planned.remote(piece.start);
+        let start = piece.start - remote.base;
+        let answer = client.range(&remote.address, start, piece.len, Some(&remote.etag))?;
+        if answer.bytes.len() as u64 != piece.len || answer.total != remote.total {
+            let text = format!("{}: it has {} bytes now, expected {}", remote.address, answer.total, remote.total);
             return Err(Fault::hinted(text, "run the same command again"));
         }
         planned.store.put(piece, &answer.bytes).map_err(|error| disk(&planned.path, &error))?;
-        told(done.fetch_add(piece.len, Ordering::Relaxed) + piece.len);
+        told(piece.len);
         Ok(())
     });
-    brought.map(|_| ()).map_err(|error| match error {
-        ScheduleError::Failed { error, .. } => error,
-        ScheduleError::Stopped { .. } => {
-            Fault::hinted("stopped".into(), "run the same command again: what has come is kept")
-        }
-        ScheduleError::NoThread { message, .. } | ScheduleError::Panicked { message, .. } => {
-            Fault::last(format!("{}: {message}", planned.written))
-        }
-    })
+    brought.map(|_| ()).map_err(|error| stopped_or(error, &planned.written))
 }
 
 /// Brings a file from a server that gives no ranges: it begins anew where it was cut.
 fn in_one_answer(client: &Client, planned: &Planned, half: &Path, told: &(dyn Fn(u64) + Sync)) -> Result<(), Fault> {
     client.trying(|| {
         let mut out = File::create(half).map_err(|error| disk(half, &error))?;
-        let mut done = 0;
-        client.whole(&planned.address, planned.total, &mut |bytes| {
-            done += bytes.len() as u64;
-            told(done);
+        client.whole(&planned.remotes[0].address, planned.total, &mut |bytes| {
+            told(bytes.len() as u64);
             out.write_all(bytes).map_err(|error| disk(half, &error))
         })
     })

@@ -1,7 +1,9 @@
 //! One range of bytes over HTTP, with redirects, retries, and a sentence for all that servers do wrong.
 
+use std::collections::BTreeSet;
 use std::io::Read;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use ureq::Agent;
@@ -9,7 +11,15 @@ use ureq::http::{HeaderMap, Response};
 
 use super::address::Address;
 use super::fault::{Fault, changed};
+use super::s3::{Credentials, Listed, fits, listed};
+use crate::clock::now;
 
+/// Requests at a time, whatever they are for.
+pub const REQUESTS: usize = 8;
+/// Files of a list at most: those of all the Earth's buildings are some hundred.
+const LISTED_MAX: usize = 10_000;
+/// Bytes of a thousand files in a list.
+const LIST_BYTES_MAX: u64 = 4 << 20;
 /// Times that a range is asked for, at most.
 const TRIES: u32 = 5;
 /// Redirects that are followed, at most.
@@ -39,6 +49,26 @@ pub struct Client<'a> {
     stop: &'a AtomicBool,
     variable: &'a (dyn Fn(&str) -> Option<String> + Sync),
     received: AtomicU64,
+    /// How many more requests may be made now, and who waits for that.
+    free: (Mutex<usize>, Condvar),
+    /// Access keys, where there are some.
+    credentials: Option<Credentials>,
+    /// Buckets that give nothing to strangers.
+    closed: Mutex<BTreeSet<String>>,
+}
+
+/// Leave to make a request.
+struct Leave<'c>(&'c (Mutex<usize>, Condvar));
+
+impl Drop for Leave<'_> {
+    fn drop(&mut self) {
+        *locked(&self.0.0) += 1;
+        self.0.1.notify_one();
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<'a> Client<'a> {
@@ -55,7 +85,16 @@ impl<'a> Client<'a> {
                 .max_idle_connections_per_host(8)
         };
         let (agent, direct) = (config().build().into(), config().proxy(None).build().into());
-        Self { agent, direct, stop, variable, received: AtomicU64::new(0) }
+        Self {
+            agent,
+            direct,
+            stop,
+            variable,
+            received: AtomicU64::new(0),
+            free: (Mutex::new(REQUESTS), Condvar::new()),
+            credentials: Credentials::find(&|name| variable(name)),
+            closed: Mutex::default(),
+        }
     }
 
     /// Bytes of bodies that have come.
@@ -76,13 +115,55 @@ impl<'a> Client<'a> {
         Address::of(named, &|name| (self.variable)(name))
     }
 
+    /// The files of a bucket that fit a pattern, in the order of their keys.
+    ///
+    /// # Errors
+    /// When the bucket does not list them, or none fits.
+    pub fn list(&self, bucket: &str, pattern: &str) -> Result<Vec<Listed>, Fault> {
+        let prefix = pattern.split('*').next().unwrap_or_default();
+        let (mut found, mut seen, mut token) = (Vec::new(), 0, None::<String>);
+        loop {
+            let variable = |name: &str| (self.variable)(name);
+            let address = Address::of_list(bucket, prefix, token.as_deref(), &variable)?;
+            let text = self.trying(|| {
+                let (response, _leave) = self.ask(&address, None)?;
+                let mut text = String::new();
+                let read = response.into_body().into_reader().take(LIST_BYTES_MAX).read_to_string(&mut text);
+                read.map_err(|error| Fault::passing(format!("{address}: {error}")))?;
+                Ok(text)
+            })?;
+            let (files, next) = listed(&text).ok_or_else(|| {
+                let hint = "name its files one by one, each with an address of its own";
+                Fault::hinted(format!("{address}: the answer is no list of files"), hint)
+            })?;
+            seen += files.len();
+            found.extend(files.into_iter().filter(|file| fits(pattern, &file.key)));
+            if LISTED_MAX < seen {
+                let text = format!("s3://{bucket}/{pattern}: found more than {LISTED_MAX} files to choose from");
+                return Err(Fault::hinted(text, "write more of their common beginning before the *"));
+            }
+            match next {
+                Some(next) if token.as_ref() != Some(&next) => token = Some(next),
+                _ => break,
+            }
+        }
+        found.sort_by(|a, b| a.key.cmp(&b.key));
+        match found.is_empty() {
+            true => Err(Fault::hinted(
+                format!("s3://{bucket}/{pattern}: no file fits"),
+                "check the address; old releases go: https://docs.overturemaps.org/release-calendar lists them",
+            )),
+            false => Ok(found),
+        }
+    }
+
     /// The bytes of a file from `start` on, at most `len`; `etag` is the mark of the version that is wanted.
     ///
     /// # Errors
     /// When the server does not give them, or another version, after several tries.
     pub fn range(&self, address: &Address, start: u64, len: u64, etag: Option<&str>) -> Result<Answer, Fault> {
         self.trying(|| {
-            let response = self.ask(address, Some((start, len)))?;
+            let (response, _leave) = self.ask(address, Some((start, len)))?;
             let (status, headers) = (response.status().as_u16(), response.headers().clone());
             if status == 200 {
                 let hint = "fetch the file by other means, and name it by its path";
@@ -108,7 +189,7 @@ impl<'a> Client<'a> {
     /// When it does not give the file at all.
     pub fn look(&self, address: &Address) -> Result<(bool, Option<u64>, String), Fault> {
         self.trying(|| {
-            let response = self.ask(address, Some((0, 1)))?;
+            let (response, _leave) = self.ask(address, Some((0, 1)))?;
             let headers = response.headers();
             let etag = text(headers, "etag");
             match response.status().as_u16() {
@@ -133,7 +214,7 @@ impl<'a> Client<'a> {
         total: u64,
         put: &mut dyn FnMut(&[u8]) -> Result<(), Fault>,
     ) -> Result<(), Fault> {
-        let response = self.ask(address, None)?;
+        let (response, _leave) = self.ask(address, None)?;
         let (mut reader, mut left) = (response.into_body().into_reader(), total);
         let mut buffer = vec![0; 1 << 16];
         loop {
@@ -175,25 +256,56 @@ impl<'a> Client<'a> {
         }
     }
 
-    /// One answer of 200 or 206, redirects followed.
-    fn ask(&self, address: &Address, range: Option<(u64, u64)>) -> Result<Response<ureq::Body>, Fault> {
+    /// One answer of 200 or 206, redirects followed, once there are few enough at work; `Leave` ends with the answer.
+    fn ask(&self, address: &Address, range: Option<(u64, u64)>) -> Result<(Response<ureq::Body>, Leave<'_>), Fault> {
+        let leave = self.leave();
         let mut at = address.clone();
         for _ in 0..=REDIRECTS {
-            let agent = if at.is_of_this_machine() { &self.direct } else { &self.agent };
-            let request = agent.get(at.url());
-            let request = match range {
-                Some((start, len)) => request.header("Range", format!("bytes={start}-{}", start + len - 1)),
-                // A file of gigabytes takes its time; what counts is that it goes on coming.
-                None => request.config().timeout_global(None).timeout_per_read(Some(CONNECT)).build(),
-            };
-            let response = request.call().map_err(|error| transport(address, &error))?;
+            let is_signed = at.bucket().is_some_and(|bucket| locked(&self.closed).contains(bucket));
+            let response = self.one(&at, range, is_signed).map_err(|error| transport(address, &error))?;
             match response.status().as_u16() {
-                200 | 206 => return Ok(response),
+                200 | 206 => return Ok((response, leave)),
                 301 | 302 | 303 | 307 | 308 => at = at.redirected(&text(response.headers(), "location"))?,
+                401 | 403 if !is_signed && self.closes(&at) => {}
                 status => return Err(refused(address, status)),
             }
         }
         Err(Fault::last(format!("{address}: it leads on more than {REDIRECTS} times")))
+    }
+
+    fn leave(&self) -> Leave<'_> {
+        let (free, told) = &self.free;
+        let mut free = told.wait_while(locked(free), |free| *free == 0).unwrap_or_else(PoisonError::into_inner);
+        *free -= 1;
+        Leave(&self.free)
+    }
+
+    /// One request, signed or not.
+    fn one(
+        &self,
+        at: &Address,
+        range: Option<(u64, u64)>,
+        is_signed: bool,
+    ) -> Result<Response<ureq::Body>, ureq::Error> {
+        let agent = if at.is_of_this_machine() { &self.direct } else { &self.agent };
+        let mut request = agent.get(at.url());
+        if let Some(credentials) = self.credentials.as_ref().filter(|_| is_signed) {
+            for (name, value) in credentials.headers(at.url(), now()) {
+                request = request.header(name, value);
+            }
+        }
+        match range {
+            Some((start, len)) => request.header("Range", format!("bytes={start}-{}", start + len - 1)).call(),
+            // A file of gigabytes takes its time; what counts is that it goes on coming.
+            None => request.config().timeout_global(None).timeout_per_read(Some(CONNECT)).build().call(),
+        }
+    }
+
+    /// Takes note of a bucket that refused a stranger; whether there are access keys to ask once more with.
+    fn closes(&self, at: &Address) -> bool {
+        let Some(bucket) = at.bucket().filter(|_| self.credentials.is_some()) else { return false };
+        locked(&self.closed).insert(bucket.to_owned());
+        true
     }
 
     /// A body of exactly `len` bytes.
@@ -252,7 +364,8 @@ fn endless(address: &Address, expected: u64) -> Fault {
 fn refused(address: &Address, status: u16) -> Fault {
     let hint = match status {
         401 | 403 => {
-            "is it public? an address that is signed for you may go into the job, or fetch the file by other means"
+            "is it public? access keys of its bucket may be in AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, \
+             or an address that is signed for you in the job"
         }
         404 | 410 => "check the address; over the sea a worldwide model has no such file: take the line out of the job",
         _ => "check the address in the job",

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!   address    what a job names ─► what is asked for over HTTP
+//!   s3         buckets: signatures and lists
 //!   client     one range of bytes, with redirects, retries and what servers do wrong
 //!   reader     the bytes of a file of another machine, as a `Read + Seek` for its directories
 //!   plan       which ranges of which files an area needs
@@ -19,5 +20,6 @@ mod pieces;
 mod plan;
 mod reader;
 mod run;
+mod s3;
 
 pub use run::{Options, fetch};

@@ -4,16 +4,18 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use build::ground::{GroundError, needed};
-use job::{Job, Lock, Locked, NamedFile, SourceFile};
-use source_files::TiffLevels;
+use build::ground::{GroundError, groups_needed, needed};
+use job::{FeatureSource, Job, Lock, Locked, NamedFile, SourceFile};
+use schedule::{ScheduleError, Workers};
+use source_files::{Crs, GeoParquet, TiffLevels};
 use store::engine::Fingerprint;
 
-use super::address::Address;
-use super::client::Client;
+use super::address::{Address, in_bucket};
+use super::client::{Client, REQUESTS};
 use super::fault::{Fault, changed};
 use super::pieces::{Piece, Pieces, folder_of, joined, whole};
 use super::reader::RemoteReader;
+use super::s3::Listed;
 
 /// A file that is to be fetched.
 pub struct Planned {
@@ -27,13 +29,26 @@ pub struct Planned {
     pub etag: String,
     /// Bytes of the whole file on the server.
     pub total: u64,
-    pub(super) address: Address,
+    pub(super) remotes: Vec<Remote>,
     pub(super) pieces: Vec<Piece>,
     pub(super) store: Pieces,
 }
 
+/// A file on a server. Those of one pattern lie one behind the other in the numbering of their bytes.
+pub struct Remote {
+    pub(super) address: Address,
+    /// The server's mark of its version.
+    pub(super) etag: String,
+    /// The number of its first byte.
+    pub(super) base: u64,
+    /// Its bytes.
+    pub(super) total: u64,
+}
+
 /// What of a file is fetched.
 pub enum What {
+    /// Row groups of files with the same columns.
+    Groups(Vec<(GeoParquet, Vec<usize>)>),
     /// The strips or tiles of a level of a raster.
     Window {
         /// The directories of the raster.
@@ -65,6 +80,11 @@ impl Planned {
     pub fn bytes(&self) -> u64 {
         if let What::Whole { .. } = self.what { self.total } else { self.pieces.iter().map(|piece| piece.len).sum() }
     }
+
+    /// The file that a byte is of.
+    pub(super) fn remote(&self, byte: u64) -> &Remote {
+        &self.remotes[self.remotes.partition_point(|remote| remote.base <= byte) - 1]
+    }
 }
 
 /// What became of a file that was fetched before.
@@ -82,7 +102,16 @@ pub enum Kept {
 /// When the server has another version, or none.
 pub fn kept(client: &Client, job: &Job, file: &NamedFile, lock: &Lock) -> Result<Kept, Fault> {
     let Some(locked) = lock.of(&file.written) else { return Ok(Kept::Not) };
-    let (_, total, etag) = client.look(&client.address(&file.path.to_string_lossy())?)?;
+    let (total, etag) = match pattern_of(&file.written) {
+        Some((bucket, pattern)) => {
+            let (total, mark) = mark_of(&client.list(bucket, pattern)?);
+            (Some(total), mark)
+        }
+        None => {
+            let (_, total, etag) = client.look(&client.address(&file.path.to_string_lossy())?)?;
+            (total, etag)
+        }
+    };
     let is_same = etag == locked.etag && total.is_none_or(|total| total == locked.remote_len);
     if !is_same {
         let version =
@@ -92,6 +121,18 @@ pub fn kept(client: &Client, job: &Job, file: &NamedFile, lock: &Lock) -> Result
     }
     let is_of_area = locked.window.is_none() || lock.area == job.fetch_area();
     Ok(if is_of_area && is_whole(locked, &job.path) { Kept::Here } else { Kept::Not })
+}
+
+/// The bucket and the pattern of an address that stands for several files.
+fn pattern_of(written: &str) -> Option<(&str, &str)> {
+    in_bucket(written).filter(|(_, key)| key.contains('*'))
+}
+
+/// Bytes of some files, and a mark of their versions.
+fn mark_of(files: &[Listed]) -> (u64, String) {
+    let text: String = files.iter().map(|file| format!("{} {} {}\n", file.key, file.len, file.etag)).collect();
+    let digits = Fingerprint::of_bytes(text.as_bytes()).to_string();
+    (files.iter().map(|file| file.len).sum(), format!("list-{}", &digits[..32]))
 }
 
 fn is_whole(locked: &Locked, job: &Path) -> bool {
@@ -104,12 +145,112 @@ fn is_whole(locked: &Locked, job: &Path) -> bool {
 /// # Errors
 /// When the server does not give it, or a raster cannot be used.
 pub fn plan(client: &Client, job: &Job, file: &NamedFile, path: PathBuf) -> Result<Planned, Fault> {
-    let address = client.address(&file.path.to_string_lossy())?;
     let raster = job.remote_rasters().into_iter().find(|raster| raster.written == file.written);
     let is_tiff = [".tif", ".tiff"].iter().any(|ending| file.written.to_lowercase().ends_with(ending));
-    match raster.filter(|_| is_tiff) {
-        Some(raster) => window(client, job, raster, (address, path)),
-        None => all_of(client, &file.written, (address, path)),
+    let is_parquet = [".parquet", ".geoparquet"].iter().any(|ending| file.written.to_lowercase().ends_with(ending));
+    let vector = vector_of(job, &file.written);
+    match (raster, vector, pattern_of(&file.written)) {
+        (None, Some(crs), pattern) if is_parquet || pattern.is_some() => {
+            groups(client, job, (file, crs), pattern, path)
+        }
+        (_, _, Some(_)) => {
+            let hint = "name each file of its own";
+            Err(Fault::hinted(format!("{}: a pattern, where only GeoParquet may be named by one", file.written), hint))
+        }
+        (Some(raster), ..) if is_tiff => {
+            window(client, job, raster, (client.address(&file.path.to_string_lossy())?, path))
+        }
+        _ => all_of(client, &file.written, (client.address(&file.path.to_string_lossy())?, path)),
+    }
+}
+
+/// The system that a job says a file of features or objects to be in, if it says one; `None` where it is none of them.
+fn vector_of<'j>(job: &'j Job, written: &str) -> Option<Option<&'j str>> {
+    let features = job.features.iter().flat_map(|features| &features.sources).find_map(|source| match source {
+        FeatureSource::File { file, crs, .. } if file.written == written => Some(crs.as_deref()),
+        _ => None,
+    });
+    let mut objects = job.objects.iter().flat_map(|objects| &objects.sources);
+    features.or_else(|| objects.find(|source| source.file.written == written).map(|source| source.crs.as_deref()))
+}
+
+/// The row groups of a GeoParquet file, or of the files that fit a pattern, that an area needs.
+fn groups(
+    client: &Client,
+    job: &Job,
+    (file, crs): (&NamedFile, Option<&str>),
+    pattern: Option<(&str, &str)>,
+    path: PathBuf,
+) -> Result<Planned, Fault> {
+    /// Bytes between files, so that no range reaches over two.
+    const APART: u64 = 1 << 20;
+    let addresses = match pattern {
+        None => vec![client.address(&file.path.to_string_lossy())?],
+        Some((bucket, pattern)) => {
+            let files = client.list(bucket, pattern)?;
+            files.iter().map(|file| client.address(&format!("s3://{bucket}/{}", file.key))).collect::<Result<_, _>>()?
+        }
+    };
+    let crs = crs.map(Crs::named).transpose().map_err(unusable)?;
+    let read = schedule::for_each_independent(&addresses, &Workers::new(REQUESTS), client.stop(), |_, address| {
+        let (found, remote) = footer(client, address)?;
+        let groups = groups_needed(job, &found, crs.as_ref()).map_err(|error| of_ground(&error))?;
+        Ok((found, groups, remote))
+    });
+    let read = read.map_err(|error| stopped_or(error, &file.written))?;
+    let (mut files, mut remotes, mut extents, mut base) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    for (found, groups, mut remote) in read {
+        remote.base = base;
+        extents.extend(found.ranges(&groups).into_iter().map(|(start, len)| (base + start, len)));
+        base += remote.total + APART;
+        files.push((found, groups));
+        remotes.push(remote);
+    }
+    let (etag, total) = match (pattern, remotes.as_slice()) {
+        (None, [remote]) => (remote.etag.clone(), remote.total),
+        _ => {
+            let listed = |remote: &Remote| Listed {
+                key: remote.address.key().to_owned(),
+                len: remote.total,
+                etag: remote.etag.clone(),
+            };
+            let (total, mark) = mark_of(&remotes.iter().map(listed).collect::<Vec<_>>());
+            (mark, total)
+        }
+    };
+    let (written, pieces) = (file.written.clone(), joined(extents));
+    let store = opened(&path, &format!("{etag}\n{total}\n{}", job.fetch_area()))?;
+    Ok(Planned { written, path, what: What::Groups(files), etag, total, remotes, pieces, store })
+}
+
+/// The footer of a GeoParquet file, in at most three requests.
+fn footer(client: &Client, address: &Address) -> Result<(GeoParquet, Remote), Fault> {
+    let (has_ranges, total, etag) = client.look(address)?;
+    let Some(total) = total.filter(|_| has_ranges) else {
+        let hint = "fetch the file by other means, and name it by its path";
+        return Err(Fault::hinted(format!("{address}: the server gives no parts of files"), hint));
+    };
+    let mut fault = None;
+    let found = GeoParquet::read(Path::new(&address.to_string()), total, &mut |start, len| {
+        client.range(address, start, len, Some(&etag)).map(|answer| answer.bytes).map_err(|error| {
+            fault = Some(error.clone());
+            io::Error::other(error.text)
+        })
+    });
+    let found = found.map_err(|error| fault.unwrap_or_else(|| unusable(error.to_string())))?;
+    Ok((found, Remote { address: address.clone(), etag, base: 0, total }))
+}
+
+/// Why work of several threads did not end.
+pub(super) fn stopped_or<R>(error: ScheduleError<R, Fault>, written: &str) -> Fault {
+    match error {
+        ScheduleError::Failed { error, .. } => error,
+        ScheduleError::Stopped { .. } => {
+            Fault::hinted("stopped".into(), "run the same command again: what has come is kept")
+        }
+        ScheduleError::NoThread { message, .. } | ScheduleError::Panicked { message, .. } => {
+            Fault::last(format!("{written}: {message}"))
+        }
     }
 }
 
@@ -122,7 +263,8 @@ fn all_of(client: &Client, written: &str, (address, path): (Address, PathBuf)) -
     let store = opened(&path, &format!("{etag}\n{total}"))?;
     let pieces = if has_ranges { whole(total) } else { Vec::new() };
     let what = What::Whole { has_ranges };
-    Ok(Planned { written: written.to_owned(), path, what, etag, total, address, pieces, store })
+    let remotes = vec![Remote { address, etag: etag.clone(), base: 0, total }];
+    Ok(Planned { written: written.to_owned(), path, what, etag, total, remotes, pieces, store })
 }
 
 fn window(
@@ -152,7 +294,8 @@ fn window(
     let (chunks, spacing_m) = (found.chunks, found.spacing_m);
     let pieces = joined(chunks.iter().map(|&chunk| levels.chunk(level, chunk)));
     let what = What::Window { levels, level, chunks, spacing_m };
-    Ok(Planned { written: raster.written.clone(), path, what, etag, total, address, pieces, store })
+    let remotes = vec![Remote { address, etag: etag.clone(), base: 0, total }];
+    Ok(Planned { written: raster.written.clone(), path, what, etag, total, remotes, pieces, store })
 }
 
 /// The coarsest level whose posts are no farther apart than those of the working grid.

@@ -1,15 +1,18 @@
-//! A job's files, planned and brought one after another, and its lock.
+//! A job's files, planned and brought several at a time, and its lock.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use exports::Step;
 use job::{Job, Lock, Locked, NamedFile, is_remote};
+use schedule::Workers;
 
 use super::bring::bring;
-use super::client::Client;
+use super::client::{Client, REQUESTS};
 use super::fault::Fault;
-use super::plan::{Kept, Planned, What, kept, plan};
-use crate::catalogue::{Entry, catalogue, of_address};
+use super::plan::{Kept, Planned, What, kept, plan, stopped_or};
+use crate::catalogue::{Catalogue, catalogue};
 use crate::clock::today;
 use crate::failure::{Failure, Outcome};
 use crate::files::bytes_text;
@@ -45,7 +48,7 @@ enum Task {
 /// When the job is none, a server does not give a file, or it cannot be written.
 pub fn fetch(options: &Options) -> Result<Outcome, Failure> {
     let job = Job::load_remote(&options.job, &build::ground::find_area)?;
-    let entries = catalogue(options.catalogue.as_deref())?;
+    let known = catalogue(options.catalogue.as_deref())?;
     let named = named_apart(&job);
     if named.is_empty() {
         terminal::tell(&format!("{}: all its files are of this machine; nothing to fetch", job.path.display()));
@@ -67,7 +70,7 @@ pub fn fetch(options: &Options) -> Result<Outcome, Failure> {
         return Err(Failure::new(message, "--max-gb allows more; a coarser spacing_m needs fewer"));
     }
     files::make_folder(&Lock::folder(&job.path))?;
-    bring_all(&client, &job, tasks, &entries, (options.quiet, left)).map_err(failed)?;
+    bring_all(&client, &job, tasks, &known, (options.quiet, left)).map_err(failed)?;
     let (place, path, came) = (Lock::place(&job.path), job.path.display(), bytes_text(client.received()));
     terminal::print(&format!("{came} came; {} says what; build it: tiefort build {path}\n", place.display()))?;
     Ok(Outcome::Sound)
@@ -79,7 +82,12 @@ fn named_apart(job: &Job) -> Vec<(NamedFile, PathBuf)> {
     let mut named: Vec<(NamedFile, PathBuf)> = Vec::new();
     for file in job.remote_files() {
         debug_assert!(is_remote(&file.written), "only those are listed");
-        let last = file.written.rsplit('/').next().unwrap_or_default();
+        let is_named = |part: &&str| part.contains(|c: char| c.is_ascii_alphanumeric()) && !part.contains('*');
+        let last = match file.written.contains('*') {
+            // A pattern's file has the name of its folder.
+            true => format!("{}.parquet", file.written.rsplit('/').find(is_named).unwrap_or_default()),
+            false => file.written.rsplit('/').next().unwrap_or_default().to_owned(),
+        };
         let plain: String =
             last.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
         let plain = plain.trim_start_matches('.').to_owned();
@@ -98,19 +106,19 @@ fn tasks(
     lock: &Lock,
     update: bool,
 ) -> Result<Vec<Task>, Fault> {
-    let mut tasks = Vec::new();
-    for (file, path) in named {
+    let task = |_, (file, path): &(NamedFile, PathBuf)| {
         let kept = match kept(client, job, file, lock) {
             Err(fault) if update && fault.is_change() => Kept::Not,
             end => end?,
         };
         let locked = lock.of(&file.written).filter(|_| kept == Kept::Here);
-        tasks.push(match locked {
+        Ok(match locked {
             Some(locked) => Task::Keep(locked.clone()),
             None => Task::Fetch(Box::new(plan(client, job, file, path.clone())?)),
-        });
-    }
-    Ok(tasks)
+        })
+    };
+    let tasks = schedule::for_each_independent(named, &Workers::new(REQUESTS), client.stop(), task);
+    tasks.map_err(|error| stopped_or(error, "fetch"))
 }
 
 /// Says what comes of each file.
@@ -131,6 +139,13 @@ fn what_comes(planned: &Planned, job: &Job) -> String {
     let (bytes, total) = (bytes_text(planned.bytes()), bytes_text(planned.total));
     match &planned.what {
         What::Whole { .. } => format!("all of it, {total}"),
+        What::Groups(files) => {
+            let of = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
+            let (all, wanted) = files
+                .iter()
+                .fold((0, 0), |(all, wanted), (file, groups)| (all + file.group_count(), wanted + groups.len()));
+            format!("{wanted} of {} in {}, {bytes} of {total}", of(all, "row group"), of(files.len(), "file"))
+        }
         What::Window { chunks, .. } if chunks.is_empty() => {
             format!("nothing, it lies outside the area; of {total}")
         }
@@ -148,38 +163,45 @@ fn bring_all(
     client: &Client,
     job: &Job,
     tasks: Vec<Task>,
-    entries: &[Entry],
+    known: &Catalogue,
     (quiet, left): (bool, u64),
 ) -> Result<(), Fault> {
     let steps = Steps::start(quiet);
-    let (mut lock, mut before) = (Lock { area: job.fetch_area(), files: Vec::new() }, 0);
-    // What is kept is in the lock from the beginning, should the rest be cut.
-    lock.files.extend(tasks.iter().filter_map(|task| match task {
-        Task::Keep(locked) => Some(locked.clone()),
-        Task::Fetch(_) => None,
-    }));
-    write(&lock, &job.path)?;
-    let order = job.remote_files();
+    let mut lock = Lock { area: job.fetch_area(), files: Vec::new() };
+    let mut left_to_do: Vec<Mutex<Option<Planned>>> = Vec::new();
     for task in tasks {
-        let Task::Fetch(planned) = task else { continue };
-        let (own, here) = (planned.left(), planned.bytes() - planned.left());
-        let told = |done: u64| {
-            let done = (before + done.saturating_sub(here)) as usize;
-            steps.tell(Step { what: "bytes came", done, total: left as usize });
-        };
-        let locked = bring(client, *planned, &told)?;
-        before += own;
+        match task {
+            // What is kept is in the lock from the beginning, should the rest be cut.
+            Task::Keep(locked) => lock.files.push(locked),
+            Task::Fetch(planned) => left_to_do.push(Mutex::new(Some(*planned))),
+        }
+    }
+    write(&lock, &job.path)?;
+    let (order, done, lock) = (job.remote_files(), AtomicU64::new(0), Mutex::new(lock));
+    let told = |bytes: u64| {
+        let done = done.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        steps.tell(Step { what: "bytes came", done: done as usize, total: left as usize });
+    };
+    let one = |_, planned: &Mutex<Option<Planned>>| {
+        let Some(planned) = guarded(planned).take() else { return Ok(()) };
+        let locked = bring(client, planned, &told)?;
         let said = job.remote_rasters().into_iter().find(|raster| raster.written == locked.address);
         let said = said.and_then(|raster| raster.said.attribution.clone());
-        let entry = of_address(entries, &locked.address);
-        let attribution = said.or_else(|| entry.map(|entry| entry.attribution.clone())).unwrap_or_default();
-        let licence = entry.map(|entry| entry.licence.clone()).unwrap_or_default();
+        let (licence, attribution) = known.said_of(&locked.address).unwrap_or_default();
+        let (licence, attribution) = (licence.to_owned(), said.unwrap_or_else(|| attribution.to_owned()));
+        let mut lock = guarded(&lock);
         lock.files.push(Locked { date: today(), licence, attribution, ..locked });
         lock.files.sort_by_key(|locked| order.iter().position(|file| file.written == locked.address));
-        write(&lock, &job.path)?;
-    }
+        write(&lock, &job.path)
+    };
+    let brought = schedule::for_each_independent(&left_to_do, &Workers::new(REQUESTS), client.stop(), one);
+    brought.map_err(|error| stopped_or(error, "fetch"))?;
     steps.finish();
     Ok(())
+}
+
+fn guarded<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn write(lock: &Lock, job: &Path) -> Result<(), Fault> {

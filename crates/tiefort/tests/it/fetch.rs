@@ -1,10 +1,11 @@
 //! `tiefort fetch`: the same ground as from the whole file, few bytes, and a sentence for all that servers do wrong.
 
 use std::fs;
+use std::path::PathBuf;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use crate::remote::{FileServer, Manner, tiled_raster};
+use crate::remote::{FileServer, Manner, roads_parquet, tiled_raster};
 use crate::scene::{Scene, everything_below};
 
 /// A job of 7 km in the raster's middle.
@@ -58,15 +59,8 @@ fn fetched_windows_build_the_same_bytes_as_the_whole_file() {
     fs::write(scene.path("whole.tif"), raster).unwrap();
     fs::write(scene.path("b.toml"), job("\"whole.tif\"", 25.0)).unwrap();
     scene.run_to(0, &["build", "b.toml", "--quiet", "--out", "b.tdb"]);
-    for part in ["tiles", "modules"] {
-        let content = |name: &str| {
-            let folder = scene.path(name).join(part);
-            let files = everything_below(&folder).into_iter();
-            files.map(|(path, bytes)| (path.strip_prefix(&folder).unwrap().to_owned(), bytes)).collect::<Vec<_>>()
-        };
-        let (own, whole) = (content("a.tdb"), content("b.tdb"));
-        assert!(!own.is_empty() && own == whole, "{part} differ");
-    }
+    let (own, whole) = (built(&scene, "a.tdb"), built(&scene, "b.tdb"));
+    assert!(!own.is_empty() && own == whole, "the same from windows as from the whole file");
     // A lock that no longer fits the job, or what lies there, is refused.
     fs::write(scene.path("a.toml"), fs::read_to_string(scene.path("a.toml")).unwrap().replace("506750", "507000"))
         .unwrap();
@@ -189,6 +183,62 @@ fn other_files_come_whole_also_in_one_answer_and_none_beyond_the_limit() {
     assert!(said.stderr.contains("are to come, expected at most 8 GB"), "{}", said.stderr);
 }
 
+/// The bytes of what was built, by name.
+fn built(scene: &Scene, name: &str) -> Vec<(PathBuf, Option<Vec<u8>>)> {
+    let folder = scene.path(name);
+    let parts = ["tiles", "modules"].iter().flat_map(|part| everything_below(&folder.join(part)));
+    parts.map(|(path, bytes)| (path.strip_prefix(&folder).unwrap().to_owned(), bytes)).collect()
+}
+
+#[test]
+fn row_groups_of_all_files_that_fit_come_from_a_bucket_that_is_closed_to_strangers() {
+    let (first, second) = (roads_parquet(&[-116.91, -100.0, -90.0]), roads_parquet(&[-80.0, -116.9]));
+    let list: String = [("a.parquet", &first), ("b.parquet", &second), ("c.txt", &first)]
+        .iter()
+        .map(|(name, bytes)| {
+            format!("<Contents><Key>x/{name}</Key><ETag>&quot;v1&quot;</ETag><Size>{}</Size></Contents>", bytes.len())
+        })
+        .collect();
+    let list = format!("<ListBucketResult><IsTruncated>false</IsTruncated>{list}</ListBucketResult>");
+    let files =
+        [("maps/", list.into_bytes()), ("maps/x/a.parquet", first.clone()), ("maps/x/b.parquet", second.clone())];
+    let server = FileServer::start(&files);
+    server.behave(Manner::Closed("AKIDEXAMPLE".into()));
+    let scene = Scene::new();
+    fs::write(scene.path("whole.tif"), tiled_raster().0).unwrap();
+    let text = job("\"whole.tif\"", 25.0);
+    fs::write(scene.path("a.toml"), format!("{text}[features]\nsources = [\"s3://maps/x/*.parquet\"]\n")).unwrap();
+    let fetch = |keys: &[(&str, &str)]| {
+        let mut program = scene.program();
+        program.args(["fetch", "a.toml", "--quiet"]).env("AWS_ENDPOINT_URL", &server.host).env("HOME", scene.path(""));
+        let said = program.envs(keys.iter().copied()).output().unwrap();
+        (said.status.code(), String::from_utf8([said.stdout, said.stderr].concat()).unwrap())
+    };
+    let (code, said) = fetch(&[]);
+    assert!(code == Some(2) && said.contains("strangers (403)") && said.contains("AWS_ACCESS_KEY_ID"), "{said}");
+    let keys =
+        [("AWS_ACCESS_KEY_ID", "AKIDEXAMPLE"), ("AWS_SECRET_ACCESS_KEY", "secret"), ("AWS_SESSION_TOKEN", "secret")];
+    let (code, said) = fetch(&keys);
+    assert!(code == Some(0) && said.contains("2 of 5 row groups in 2 files"), "{said}");
+    assert!(!said.contains("secret") && !said.contains("AKID"), "{said}");
+    check_no_secret(&scene);
+    let lock = fs::read_to_string(scene.path("a.lock")).unwrap();
+    assert!(lock.contains("address = \"s3://maps/x/*.parquet\"") && !lock.contains("AKID"), "{lock}");
+    scene.run_to(0, &["build", "a.toml", "--quiet"]);
+    fs::write(scene.path("first.parquet"), first).unwrap();
+    fs::write(scene.path("second.parquet"), second).unwrap();
+    fs::write(scene.path("b.toml"), format!("{text}[features]\nsources = [\"first.parquet\", \"second.parquet\"]\n"))
+        .unwrap();
+    scene.run_to(0, &["build", "b.toml", "--quiet", "--out", "b.tdb"]);
+    let (own, whole) = (built(&scene, "a.tdb"), built(&scene, "b.tdb"));
+    assert!(!own.is_empty() && own == whole, "the same from row groups as from whole files");
+    let (code, said) = fetch(&keys);
+    assert!(code == Some(0) && said.contains("is here"), "{said}");
+    server.change("\"v2\"");
+    // The list still has the old mark, so the files are as they were said to be.
+    assert_eq!(fetch(&keys).0, Some(0));
+}
+
 #[test]
 fn a_place_becomes_a_job_without_a_network() {
     let scene = Scene::new();
@@ -200,6 +250,12 @@ fn a_place_becomes_a_job_without_a_network() {
     assert_eq!(held, [true, false, false], "{text}");
     assert!(text.contains("crs = \"EPSG:32611\"") && text.contains("COPERNICUS"), "{text}");
     scene.refuses(&["build", "irwin.toml"], &["which is not fetched"]);
+    let vectors = ["init", "--around", "35.3,-116.6", "--km", "20", "--dem", "3dep13", "--vectors", "overture"];
+    scene.refuses(&vectors, &["found no --release"]);
+    let said = scene.run_to(0, &[&vectors[..], &["--release", "2025-11-19.0", "--out", "o.toml"]].concat());
+    let text = fs::read_to_string(scene.path("o.toml")).unwrap();
+    assert!(text.contains("/2025-11-19.0/theme=transportation/type=segment/*.parquet\""), "{text}{}", said.stdout);
+    scene.refuses(&["build", "o.toml"], &["which is not fetched"]);
     scene.refuses(&["init", "--around", "35.3,-116.6", "--dem", "3dep1m"], &["3dep1m"]);
     scene.refuses(&["init", "--around", "35.3,-116.6", "--dem", "moon"], &["no such source", "glo30"]);
     let said = scene.run_to(0, &["sources"]);

@@ -1,0 +1,330 @@
+//! GeoParquet: what its footer says, which of its row groups meet a rectangle, and a file of some of them.
+//!
+//! The footer lies at the end of a file and says where each column of each row group is and between which values its
+//! boxes lie; so what an area needs is known from a few ranges of bytes. A file of some row groups has their bytes as
+//! they were, and a footer of its own.
+
+mod geo;
+mod pages;
+mod thrift;
+
+use std::io::{self, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use parquet::errors::ParquetError;
+use parquet::file::metadata::page_index::RowGroupPageIndex;
+use parquet::file::metadata::{
+    ColumnChunkMetaData, ParquetMetaData, ParquetMetaDataReader, ParquetMetaDataWriter, RowGroupMetaData,
+};
+use parquet::file::properties::ReaderProperties;
+use parquet::file::serialized_reader::SerializedRowGroupReader;
+use parquet::file::statistics::Statistics;
+use parquet::file::writer::TrackedWrite;
+use parquet::record::Row;
+use parquet::record::reader::RowIter;
+use parquet::schema::types::Type;
+
+use crate::SourceError;
+use crate::crs::Crs;
+use crate::features::Extent;
+use crate::limits::PARQUET_FOOTER_BYTES_MAX;
+use geo::Geo;
+use pages::Pages;
+
+/// How every one begins and ends.
+pub(crate) const MARK: &[u8] = b"PAR1";
+/// Bytes at the end that are read at once: a small footer lies in them.
+const TAIL: u64 = 64 << 10;
+/// Bytes of a part of a row group that is asked for at once.
+const SLICE: u64 = 4 << 20;
+
+/// What the footer of a GeoParquet file says.
+pub struct GeoParquet {
+    path: PathBuf,
+    len: u64,
+    metadata: ParquetMetaData,
+    geo: Geo,
+}
+
+impl GeoParquet {
+    /// Reads the footer of a file of `len` bytes, of which `read` gives those from a place on; `path` is for messages.
+    ///
+    /// # Errors
+    /// Those of `read`, and when it is no GeoParquet, broken, or its geometries are not in well-known binary.
+    pub fn read(
+        path: &Path,
+        len: u64,
+        read: &mut dyn FnMut(u64, u64) -> io::Result<Vec<u8>>,
+    ) -> Result<Self, SourceError> {
+        let mut bytes =
+            |start, count| read(start, count).map_err(|source| SourceError::Read { path: path.into(), source });
+        let whole = (MARK.len() * 2 + 4) as u64;
+        if len < whole {
+            return Err(SourceError::Truncated {
+                path: path.into(),
+                what: "the footer".into(),
+                expected: whole,
+                found: len,
+            });
+        }
+        let tail_len = len.min(TAIL);
+        let mut tail = bytes(len - tail_len, tail_len)?;
+        let end = tail.len().saturating_sub(8);
+        let [a, b, c, d, ref mark @ ..] = tail[end..] else {
+            return Err(broken(path, "nothing at its end".into(), "a footer"));
+        };
+        if mark != MARK {
+            return Err(broken(path, "no mark at its end".into(), "a whole file, not encrypted"));
+        }
+        let footer_len = u64::from(u32::from_le_bytes([a, b, c, d]));
+        if PARQUET_FOOTER_BYTES_MAX < footer_len {
+            let (what, limit) = ("bytes of a footer", PARQUET_FOOTER_BYTES_MAX);
+            return Err(SourceError::TooLarge { path: path.into(), what, found: footer_len, limit });
+        }
+        if len - whole < footer_len {
+            return Err(broken(path, format!("a footer of {footer_len} bytes"), "one that fits into the file"));
+        }
+        tail.truncate(end);
+        let footer = match (tail.len() as u64).checked_sub(footer_len) {
+            Some(before) => tail.split_off(before as usize),
+            None => bytes(len - 8 - footer_len, footer_len)?,
+        };
+        if !thrift::is_sound_footer(&footer) {
+            return Err(broken(path, "a footer that cannot be read".into(), "a sound one"));
+        }
+        let metadata = caught(|| ParquetMetaDataReader::decode_metadata(&footer));
+        let metadata = metadata.map_err(|error| broken(path, error.to_string(), "a sound footer"))?;
+        Self::of(path, len, metadata)
+    }
+
+    fn of(path: &Path, len: u64, metadata: ParquetMetaData) -> Result<Self, SourceError> {
+        let said = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+        let text = said.filter(|said| said.key == "geo").find_map(|said| said.value.as_deref());
+        let text = text.ok_or_else(|| SourceError::NotFeatures {
+            path: path.into(),
+            found: "a Parquet file that is no GeoParquet: nothing in it says which column holds geometries".into(),
+        })?;
+        let mut geo = Geo::read(text).map_err(|(found, expected)| broken(path, found, expected))?;
+        let file = Self::has_sound_groups(path, len, &metadata)?;
+        geo.boxes = geo.boxes.or_else(|| boxes_of(file));
+        Ok(Self { path: path.into(), len, metadata, geo })
+    }
+
+    /// Refuses row groups that lie outside the file or have more rows than it can hold; the schema of others.
+    fn has_sound_groups<'m>(path: &Path, len: u64, metadata: &'m ParquetMetaData) -> Result<&'m Type, SourceError> {
+        let (mut rows, mut number) = (0_u64, 0);
+        for group in metadata.row_groups() {
+            rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
+            for column in group.columns() {
+                let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+                let [start, size] = [start, column.compressed_size()].map(|number| u64::try_from(number).ok());
+                let end = start.zip(size).and_then(|(start, size)| start.checked_add(size));
+                if end.is_none_or(|end| len < end) || column.file_path().is_some() {
+                    return Err(broken(path, format!("row group {number}, which lies outside the file"), "one inside"));
+                }
+            }
+            number += 1;
+        }
+        // Each row has a geometry, of which none is packed to less than a byte.
+        match rows <= len {
+            true => Ok(metadata.file_metadata().schema()),
+            false => Err(broken(path, format!("{rows} rows in {len} bytes"), "fewer rows than bytes")),
+        }
+    }
+
+    /// The file, for messages.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Its bytes.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.len
+    }
+
+    /// The column of geometries.
+    pub(crate) fn column(&self) -> &str {
+        &self.geo.column
+    }
+
+    /// The columns.
+    pub(crate) fn schema(&self) -> &Type {
+        self.metadata.file_metadata().schema()
+    }
+
+    /// The system of its coordinates, where it is known.
+    pub(crate) fn system(&self) -> Result<Option<Crs>, SourceError> {
+        match &self.geo.crs {
+            Ok(None) => Ok(self.geo.looks_like_degrees.then(Crs::wgs84)),
+            Ok(crs) => Ok(crs.clone()),
+            Err(found) => Err(SourceError::UnnamedCrs { path: self.path.clone(), found: found.clone() }),
+        }
+    }
+
+    /// How many row groups it has.
+    pub fn group_count(&self) -> usize {
+        self.metadata.num_row_groups()
+    }
+
+    /// Rows of a row group.
+    pub(crate) fn rows_of(&self, group: usize) -> u64 {
+        u64::try_from(self.metadata.row_group(group).num_rows()).unwrap_or(0)
+    }
+
+    /// Where the features of a row group lie, where its statistics say so.
+    pub(crate) fn extent(&self, group: usize) -> Option<Extent> {
+        let group = self.metadata.row_group(group);
+        let [east, north] = self.geo.boxes.as_ref()?;
+        let end = |path: &[String], pick: Pick| {
+            let columns = group.columns();
+            let column = columns.iter().find(|column| column.column_path().parts() == path)?;
+            bound(column.statistics()?, pick)
+        };
+        let side = |[least, greatest]: &[Vec<String>; 2]| {
+            let (least, greatest) = (end(least, Pick::Least)?, end(greatest, Pick::Greatest)?);
+            // Boxes may be rounded to floats of 32 bits, to either side.
+            let slack = 2e-7 * least.abs().max(greatest.abs());
+            (least <= greatest).then_some([least - slack, greatest + slack])
+        };
+        Some(Extent { east: side(east)?, north: side(north)? })
+    }
+
+    /// Hands on the rows of a row group with some of its columns.
+    ///
+    /// # Errors
+    /// When they cannot be read, or `each` fails.
+    pub(crate) fn rows(
+        &self,
+        groups: &[usize],
+        columns: &Type,
+        each: &mut dyn FnMut(usize, Row) -> Result<(), SourceError>,
+    ) -> Result<(), SourceError> {
+        let pages =
+            Pages::open(&self.path, self.len).map_err(|source| SourceError::Open { path: self.path.clone(), source });
+        let (pages, properties) = (Arc::new(pages?), Arc::new(ReaderProperties::builder().build()));
+        for &number in groups {
+            let failed = |error: ParquetError| {
+                let expected = "a sound one, packed with zstd, snappy or gzip";
+                broken(&self.path, format!("row group {number}: {error}"), expected)
+            };
+            let group = self.metadata.row_group(number);
+            let index = RowGroupPageIndex::new(number, None);
+            let reader = SerializedRowGroupReader::new(pages.clone(), group, index, properties.clone());
+            let reader = reader.map_err(failed)?;
+            let mut rows = caught(|| RowIter::from_row_group(Some(columns.clone()), &reader)).map_err(failed)?;
+            while let Some(row) = caught(|| rows.next().transpose()).map_err(failed)? {
+                each(number, row)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Ranges of bytes of some row groups, in their order.
+    pub fn ranges(&self, groups: &[usize]) -> Vec<(u64, u64)> {
+        let columns = groups.iter().flat_map(|&group| self.metadata.row_group(group).columns());
+        columns.flat_map(|column| slices(column.byte_range())).collect()
+    }
+
+    /// Writes some row groups of files with the same columns as one file; `data` gives ranges of bytes of each.
+    ///
+    /// # Errors
+    /// Those of `out` and of `data`, and when the columns differ.
+    pub fn write(
+        parts: &[(&Self, Vec<usize>)],
+        out: &mut impl Write,
+        mut data: impl FnMut(usize, (u64, u64)) -> io::Result<Vec<u8>>,
+    ) -> io::Result<()> {
+        let mut out = TrackedWrite::new(out);
+        let Some((first, _)) = parts.first() else { return Ok(()) };
+        out.write_all(MARK)?;
+        let mut groups = Vec::new();
+        for (number, (file, wanted)) in parts.iter().enumerate() {
+            if file.schema() != first.schema() || file.geo.column != first.geo.column {
+                let text = format!("{} has other columns than {}", file.path.display(), first.path.display());
+                return Err(io::Error::new(io::ErrorKind::InvalidData, text));
+            }
+            for &group in wanted {
+                let group = file.metadata.row_group(group);
+                let place = out.bytes_written() as u64;
+                for column in group.columns() {
+                    for slice in slices(column.byte_range()) {
+                        out.write_all(&data(number, slice)?)?;
+                    }
+                }
+                groups.push(moved(group, place, groups.len()).map_err(io::Error::other)?);
+            }
+        }
+        let metadata = ParquetMetaData::new(first.metadata.file_metadata().clone(), groups);
+        ParquetMetaDataWriter::new_with_tracked(out, &metadata).finish().map_err(io::Error::other)
+    }
+}
+
+/// What the library does, which panics at some values that no writer would have written.
+fn caught<T>(read: impl FnOnce() -> parquet::errors::Result<T>) -> parquet::errors::Result<T> {
+    let read = catch_unwind(AssertUnwindSafe(read));
+    read.unwrap_or_else(|_| Err(ParquetError::General("values that cannot be read".into())))
+}
+
+/// A row group whose columns lie one after another from a place on.
+fn moved(group: &RowGroupMetaData, place: u64, number: usize) -> parquet::errors::Result<RowGroupMetaData> {
+    let mut at = place;
+    let column = |column: &ColumnChunkMetaData| {
+        let (start, len) = column.byte_range();
+        let by = at.cast_signed() - start.cast_signed();
+        at += len;
+        let dictionary = column.dictionary_page_offset().map(|offset| offset + by);
+        let moved = column.clone().into_builder().set_data_page_offset(column.data_page_offset() + by);
+        // What lies outside the row groups is not copied.
+        moved
+            .set_dictionary_page_offset(dictionary)
+            .set_index_page_offset(None)
+            .set_bloom_filter_offset(None)
+            .set_bloom_filter_length(None)
+            .set_offset_index_offset(None)
+            .set_offset_index_length(None)
+            .set_column_index_offset(None)
+            .set_column_index_length(None)
+            .build()
+    };
+    let columns = group.columns().iter().map(column).collect::<Result<Vec<_>, _>>()?;
+    let moved = group.clone().into_builder().set_column_metadata(columns);
+    moved.set_file_offset(place.cast_signed()).set_ordinal(number as i32).build()
+}
+
+fn slices((start, len): (u64, u64)) -> impl Iterator<Item = (u64, u64)> {
+    (0..len.div_ceil(SLICE)).map(move |index| (start + index * SLICE, SLICE.min(len - index * SLICE)))
+}
+
+/// Which end of a column's values.
+#[derive(Clone, Copy)]
+enum Pick {
+    Least,
+    Greatest,
+}
+
+fn bound(statistics: &Statistics, pick: Pick) -> Option<f64> {
+    let bound = match (statistics, pick) {
+        (Statistics::Double(values), Pick::Least) => *values.min_opt()?,
+        (Statistics::Double(values), Pick::Greatest) => *values.max_opt()?,
+        (Statistics::Float(values), Pick::Least) => f64::from(*values.min_opt()?),
+        (Statistics::Float(values), Pick::Greatest) => f64::from(*values.max_opt()?),
+        _ => return None,
+    };
+    bound.is_finite().then_some(bound)
+}
+
+/// The boxes of a column `bbox`, as files had them before GeoParquet had a word for it.
+fn boxes_of(schema: &Type) -> Option<[[Vec<String>; 2]; 2]> {
+    let column = schema.get_fields().iter().find(|field| field.name() == "bbox" && field.is_group())?;
+    let path = |name: &str| {
+        let is_there = column.get_fields().iter().any(|field| field.name() == name && field.is_primitive());
+        is_there.then(|| vec!["bbox".to_owned(), name.to_owned()])
+    };
+    Some([[path("xmin")?, path("xmax")?], [path("ymin")?, path("ymax")?]])
+}
+
+fn broken(path: &Path, found: String, expected: &str) -> SourceError {
+    SourceError::Malformed { path: path.into(), what: "the GeoParquet".into(), found, expected: expected.into() }
+}
