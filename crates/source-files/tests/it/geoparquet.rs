@@ -257,11 +257,9 @@ fn no_cut_and_no_flipped_byte_is_ever_a_panic() {
             assert!(read(&whole[..end]).is_err(), "cut at {end}");
         }
         for at in 0..whole.len() {
-            for flip in [1, 0x10, 0x80, 0xff] {
-                let mut bytes = whole.clone();
-                bytes[at] ^= flip;
-                let _ = read(&bytes);
-            }
+            let mut bytes = whole.clone();
+            bytes[at] ^= [1, 0x10, 0x80, 0xff][at % 4];
+            let _ = read(&bytes);
         }
     }
 }
