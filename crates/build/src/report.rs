@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::product::Told;
 use fidelity::{Curvature, Residuals, Tally};
-use job::{Choice, HOLE_CLASS_NAME};
+use job::HOLE_CLASS_NAME;
 use store::{
     Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportEnough, ReportHeights, ReportLevel,
     ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals,
@@ -59,7 +59,7 @@ impl Findings<'_> {
             workers: run.workers.count() as u32,
             stages: Vec::new(),
             points,
-            count: run.job.limits.count.name().into(),
+            count: run.job.counted_words().into(),
             triangles: sum(|numbers| numbers.triangles),
             polygons: sum(|numbers| numbers.polygons),
             per_load_module: self.per_module(&counts),

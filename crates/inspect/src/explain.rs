@@ -8,7 +8,7 @@ use build::ground::GroundError;
 use build::product::{Product, Wanted, WantedGround};
 use build::{CompileError, Stage};
 use fidelity::{Split, best_split};
-use job::{Choice, HOLE_CLASS_NAME};
+use job::HOLE_CLASS_NAME;
 use schedule::Workers;
 use serde_json::Value;
 use store::{Folder, TileState, files};
@@ -29,7 +29,7 @@ pub struct Explanation {
     pub tile: (TileId, TileState, StopReason),
     /// Triangles that the tile's points were charged, and the most it was allowed, where it was.
     pub tile_triangles: (u32, Option<u64>),
-    /// What limits count: `triangles` or `polygons`.
+    /// What limits count, in words, as [`job::Job::counted_words`] has them.
     pub count_of: String,
     /// Triangles and convex polygons.
     pub triangles: u32,
@@ -193,7 +193,7 @@ fn explained(
         extent_m: [west, south, west + side_m, south + side_m],
         tile: (tin.tile, state, tin.stop),
         tile_triangles: (tin.triangles_charged, allowed(allocation, tin.tile)),
-        count_of: limits.count.name().into(),
+        count_of: product.job.counted_words().into(),
         triangles: module.counts().triangles,
         polygons: module.counts().polygons,
         vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,

@@ -10,7 +10,6 @@ use std::sync::atomic::AtomicBool;
 use build::CompileError;
 use build::ground::{GamingArea, Ground, Window};
 use build::product::{Opened, choose_ground, locate_weights};
-use job::Choice;
 use schedule::Workers;
 use store::FeatureFarOff;
 use terrain::OffCause;
@@ -46,7 +45,7 @@ pub struct Inadequate {
     pub residual_m: Vec<f32>,
     /// Its load modules.
     pub grid: ModuleGrid,
-    /// What limits count: `triangles` or `polygons`.
+    /// What limits count, in words, as [`job::Job::counted_words`] has them.
     pub count: &'static str,
     /// What each load module has of that, row-major.
     pub counts: Vec<u32>,
@@ -127,7 +126,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         tolerance_m,
         frame: *frame,
         grid: area.grid,
-        count: job.limits.count.name(),
+        count: job.counted_words(),
         per_module: area.budget.per_module,
         components,
         counts,

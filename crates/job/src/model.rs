@@ -7,7 +7,7 @@ use terrain::{
     TileOrder,
 };
 
-use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, ObjectsSpec, Start, WaterSpec};
+use crate::{Choice, FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, ObjectsSpec, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -259,6 +259,16 @@ pub enum Count {
 }
 
 impl Job {
+    /// The words for what limits count.
+    pub fn counted_words(&self) -> &'static str {
+        let is_joint = self.objects.as_ref().is_some_and(|objects| objects.joint);
+        match (self.limits.count, is_joint) {
+            (count, false) => count.name(),
+            (Count::Triangles, true) => "triangles and objects",
+            (Count::Polygons, true) => "polygons and objects",
+        }
+    }
+
     /// What a load module has of what limits count: decks too, and objects where they count together with the ground.
     pub fn counted(&self, module: &LoadModule) -> u32 {
         let counts = module.counts();

@@ -17,7 +17,7 @@ pub struct Report {
     pub stages: Vec<ReportStage>,
     /// Points of the area.
     pub points: ReportPoints,
-    /// What limits count: `triangles` or `polygons`.
+    /// What limits count: `triangles` or `polygons`, followed by `and objects` where those count, too.
     pub count: String,
     /// Triangles of all load modules.
     pub triangles: u64,

@@ -36,7 +36,9 @@ fn findings(report: &Report) -> Table {
     let (against, residual) = leading(report);
     let largest = format!("RMS against the {against}, largest {:.2} m", residual.max_m);
     table.row(["Residual", &format!("{:.3} m", residual.rms_m), &largest]);
-    let mean = format!("{:.2} per load module, {} points", report.per_load_module.mean, grouped(report.points.total));
+    let counted = if report.count == "triangles" { String::new() } else { format!(" {}", report.count) };
+    let (mean, points) = (report.per_load_module.mean, grouped(report.points.total));
+    let mean = format!("{mean:.2}{counted} per load module, {points} points");
     table.row(["Triangles", &grouped(report.triangles), &mean]);
     table.row(["Breaches", &grouped(report.breaches.len() as u64), &breach_kinds(report)]);
     if let Some(features) = &report.features {

@@ -1,6 +1,6 @@
 //! From a database that was read back to what pictures and reports are drawn from.
 
-use job::{Choice, Job};
+use job::Job;
 use store::{Report, ReportPlace, TileState};
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
@@ -32,7 +32,7 @@ impl SceneParts {
             }
         }
         let limits = SceneLimits {
-            count: limits.count.name().into(),
+            count: product.job.counted_words().into(),
             modules: use_of.modules,
             per_load_module: limits.per_load_module,
             window: use_of.window,

@@ -2,7 +2,7 @@
 //! say.
 
 use fidelity::Residuals;
-use job::{Choice, Job};
+use job::Job;
 use store::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
 use terrain::{LoadModule, ModuleCounts, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
 
@@ -172,7 +172,7 @@ pub(crate) fn differing_report(
     if report.area != job.area.name {
         problems.push(format!("report.json: area is \"{}\", the job's is \"{}\"", report.area, job.area.name));
     }
-    let word = job.limits.count.name();
+    let word = job.counted_words();
     if report.count != word {
         problems.push(format!("report.json: count is \"{}\", the job's is \"{word}\"", report.count));
     }

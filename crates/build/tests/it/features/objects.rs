@@ -170,6 +170,7 @@ fn objects_that_count_jointly_leave_the_ground_what_they_do_not_take() {
         assert!(report.triangles < apart.triangles, "{limits}: the ground has less");
         let counted = (report.per_load_module.mean * 16.0).round() as u64;
         assert_eq!(counted, report.triangles + objects, "{limits}");
+        assert_eq!([&report.count, &apart.count], ["triangles and objects", "triangles"]);
         let area = (16.0 * report.per_load_module.mean_limit) as u64;
         let full = [
             (report.per_load_module.max, report.per_load_module.limit),
