@@ -204,7 +204,8 @@ impl Run<'_> {
         };
         let fewer = fewer.filter(|(asked, fit)| fit < asked).map(|(asked, fit)| {
             format!(
-                "tin.points: {asked} are asked for, and beside roads, water and objects {fit} fit limits.mean_per_load_module"
+                "tin.points: {asked} are asked for, and beside roads, water and objects {fit} fit \
+                 limits.mean_per_load_module"
             )
         });
         self.ground.warnings.iter().chain(of_features).cloned().chain(fewer).collect()

@@ -7,7 +7,7 @@ use terrain::{
     TileOrder,
 };
 
-use crate::{Choice, FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, ObjectsSpec, Start, WaterSpec};
+use crate::{FeaturesSpec, GeoidSpec, ImportanceSpec, LodSpec, NamedFile, ObjectsSpec, Start, WaterSpec};
 
 /// All a run needs, as the job file says it, defaults filled in.
 #[derive(Clone, Debug, PartialEq)]
@@ -263,7 +263,8 @@ impl Job {
     pub fn counted_words(&self) -> &'static str {
         let is_joint = self.objects.as_ref().is_some_and(|objects| objects.joint);
         match (self.limits.count, is_joint) {
-            (count, false) => count.name(),
+            (Count::Triangles, false) => "triangles",
+            (Count::Polygons, false) => "polygons",
             (Count::Triangles, true) => "triangles and objects",
             (Count::Polygons, true) => "polygons and objects",
         }

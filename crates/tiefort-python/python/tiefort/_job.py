@@ -262,7 +262,8 @@ def export(
         The terrain database; and the file, or the folder, to write.
     format : str
         ``modules``, ``ply``, ``obj``, ``glb``, ``geotiff``, ``gpkg``, ``features``, ``openflight``, ``3dtiles``,
-        ``3tz``, ``quantized-mesh``, ``mbtiles``, ``terrain-rgb``, ``usd``, ``heightmap``, ``gazebo``.
+        ``3tz``, ``3dtiles-terrain``, ``quantized-mesh``, ``mbtiles``, ``terrain-rgb``, ``usd``, ``heightmap``,
+        ``gazebo``.
     modules : (row, col), ((row, col), (row, col)) or str, optional
         One load module, or the south-western and the north-eastern one of a block.
     lod, coordinates, layer, against, assume_datum, workers

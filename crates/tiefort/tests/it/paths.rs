@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::scene::{Said, Scene};
+use crate::scene::{Said, Scene, send};
 
 /// Longest that a refusal may take, on a machine at its limits.
 const SECONDS_MAX: Duration = Duration::from_secs(20);
@@ -349,8 +349,7 @@ fn a_signal_while_a_file_is_being_written_leaves_nothing_behind() {
     while !holds_bytes(&scene.path("")) && begun.elapsed() < SECONDS_MAX {
         std::thread::yield_now();
     }
-    let killed = Command::new("kill").arg(child.id().to_string()).status().unwrap();
-    assert!(killed.success());
+    send("-TERM", child.id());
     assert_eq!(child.wait().unwrap().code(), Some(143));
     assert!(scene.everything() == before, "nothing half-written is left");
 }

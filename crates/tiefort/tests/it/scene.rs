@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
@@ -90,6 +90,13 @@ impl Scene {
         assert!(new.is_empty(), "{arguments:?} was refused and yet left {new:?}");
         assert!(before == after, "{arguments:?} was refused and yet changed a file");
     }
+}
+
+/// Sends a signal to a process, by the shell: a program for it is not everywhere.
+#[track_caller]
+pub fn send(signal: &str, process: u32) {
+    let sent = Command::new("sh").args(["-c", &format!("kill {signal} {process}")]).status().unwrap();
+    assert!(sent.success(), "kill {signal} {process}");
 }
 
 pub fn everything_below(folder: &Path) -> BTreeMap<PathBuf, Option<Vec<u8>>> {

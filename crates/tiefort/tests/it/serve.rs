@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use load_module_reader::{Area, Keep, LoadedGround, Sight};
 use serde_json::{Value, json};
 
-use crate::scene::{Scene, everything_below};
+use crate::scene::{Scene, everything_below, send};
 use crate::server::{ENOUGH, Server};
 
 fn built() -> Scene {
@@ -565,7 +565,7 @@ fn only_this_machine_and_the_origins_that_were_named_may_ask() {
 fn ctrl_c_ends_it_in_order_from_the_moment_its_address_is_told() {
     for signal in ["-INT", "-TERM", "-INT", "-TERM"] {
         let mut server = served();
-        std::process::Command::new("kill").args([signal, &server.process.id().to_string()]).status().unwrap();
+        send(signal, server.process.id());
         assert_eq!(server.process.wait().unwrap().code(), Some(0), "{signal}");
     }
 }
@@ -578,7 +578,7 @@ fn ctrl_c_ends_it_within_a_second_with_clients_connected() {
         let mut idle = server.connect();
         idle.write_all(b"GET / HTTP/1.1\r\n").unwrap();
         let start = Instant::now();
-        std::process::Command::new("kill").args([signal, &server.process.id().to_string()]).status().unwrap();
+        send(signal, server.process.id());
         assert_eq!(server.process.wait().unwrap().code(), Some(0));
         // One second is asked for; a machine at its limits is allowed a little more.
         assert!(start.elapsed() < Duration::from_millis(2500), "{signal}: {:?}", start.elapsed());

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 use store::Lock;
 
-use crate::scene::{Said, Scene};
+use crate::scene::{Said, Scene, send};
 
 #[test]
 fn a_quiet_build_says_nothing() {
@@ -80,7 +80,7 @@ fn interrupted(scene: &Scene, signal: &str) -> Said {
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     let refined = |line: &String| line.contains("\"done\"") && line.contains("\"refine\"");
     assert!(lines.by_ref().map_while(Result::ok).any(|line| refined(&line)), "no tile was refined");
-    Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
+    send(signal, child.id());
     let code = child.wait().unwrap().code();
     let mut stderr = String::new();
     child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();

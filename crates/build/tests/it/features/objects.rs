@@ -125,11 +125,11 @@ fn objects_change_no_ground_and_bytes_do_not_depend_on_who_builds() {
     for (row, col) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         assert_eq!(ground(&with.scene, row, col), ground(&without.scene, row, col));
     }
-    same_whoever_builds(&with.scene);
+    check_other_ways_of_building(&with.scene);
 }
 
 /// Many workers, unit by unit, and each tile again alone.
-fn same_whoever_builds(scene: &Scene) {
+fn check_other_ways_of_building(scene: &Scene) {
     let product = scene.product("area.tdb");
     for workers in [1, 8] {
         let name = format!("again-{workers}");
@@ -181,7 +181,7 @@ fn objects_that_count_jointly_leave_the_ground_what_they_do_not_take() {
         let (count, limit) = full[what_binds];
         assert!(limit - limit / 20 <= count, "{limits}: {full:?}");
         joint.scene.verify("area.tdb");
-        same_whoever_builds(&joint.scene);
+        check_other_ways_of_building(&joint.scene);
     }
 }
 
