@@ -259,26 +259,14 @@ fn put_level(text: &mut String, product: &Product, rect: ModuleRect) {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-    use std::sync::Mutex;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
 
     use super::*;
     use crate::samples;
 
     #[test]
     fn a_world_has_a_model_and_a_level_for_each_block_and_a_mesh_for_each_model() {
-        let files = Mutex::new(BTreeMap::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().insert(name.to_owned(), String::from_utf8(bytes.to_vec()).unwrap());
-            Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
         let product = samples::with_bridge();
-        write_gazebo(&product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
-        let files = files.into_inner().unwrap();
+        let files = samples::texts(|put, work| write_gazebo(&product, put, work));
         let names: Vec<&str> = files.keys().map(String::as_str).collect();
         assert_eq!(names, ["area.sdf", "meshes/classes.mtl", "meshes/r0000c0000_r0000c0001.obj"]);
         let world = &files["area.sdf"];

@@ -71,10 +71,6 @@ fn file_of(tile: &TileModules, levels: Vec<LoadModule>) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use std::path::Path;
-    use std::sync::Mutex;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
 
     use super::*;
     use crate::samples;
@@ -91,16 +87,8 @@ mod tests {
 
     #[track_caller]
     fn check(product: &Product) {
-        let files = Mutex::new(Vec::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().push((name.to_owned(), bytes.to_vec()));
-            Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        write_modules(product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
-        let mut files = files.into_inner().unwrap();
-        files.sort();
-        assert_eq!(files.iter().map(|(name, _)| &**name).collect::<Vec<_>>(), ["r0000c0000.slm", "r0000c0001.slm"]);
+        let files = samples::files(|put, work| write_modules(product, put, work));
+        assert_eq!(files.keys().collect::<Vec<_>>(), ["r0000c0000.slm", "r0000c0001.slm"]);
         for (index, (name, bytes)) in files.iter().enumerate() {
             let (header, read) = store::decode_levels(Path::new(name), bytes).unwrap();
             assert_eq!((header.modules.count(), read.len()), (1, 1 + product.coarser.len()));

@@ -205,24 +205,13 @@ fn utm_zone(epsg: Option<u32>) -> Option<i16> {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::Mutex;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
 
     use super::*;
     use crate::samples;
 
     #[test]
     fn an_area_is_a_file_per_square_one_that_refers_to_them_and_an_index() {
-        let files = Mutex::new(BTreeMap::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-            Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        write_openflight(&samples::product(), &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
-        let files = files.into_inner().unwrap();
+        let files = samples::files(|put, work| write_openflight(&samples::product(), put, work));
         assert_eq!(files.keys().collect::<Vec<_>>(), ["area.flt", "area.mft", "squares/r00c00.flt"]);
         let count = |code: u16, bytes: &[u8]| {
             let (mut at, mut count) = (0, 0);
@@ -243,14 +232,8 @@ mod tests {
     #[test]
     fn decks_are_a_group_of_their_own_behind_the_ground() {
         let write = |product: &Product| {
-            let files = Mutex::new(BTreeMap::new());
-            let put = |name: &str, bytes: &[u8]| {
-                files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-                Ok(())
-            };
-            let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-            write_openflight(product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
-            files.into_inner().unwrap().remove("squares/r00c00.flt").unwrap()
+            let mut files = samples::files(|put, work| write_openflight(product, put, work));
+            files.remove("squares/r00c00.flt").unwrap()
         };
         let bytes = write(&samples::with_bridge());
         let (mut at, mut found) = (0, BTreeMap::new());

@@ -1,7 +1,10 @@
 //! A small product for the tests of this crate: two load modules side by side, in an area of two.
 
 use std::collections::BTreeMap;
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 
+use schedule::Workers;
 use store::{
     Area, Fingerprint, Manifest, Report, ReportBreach, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
@@ -11,7 +14,29 @@ use terrain::{
     ModuleId, ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, ObjectKind, Prism, Spacing, TileId,
 };
 
-use crate::Product;
+use crate::{ExportError, Product, Put, Work};
+
+/// The files of an export that writes a folder.
+pub(crate) fn files<T>(write: impl FnOnce(&Put, &Work) -> Result<T, ExportError>) -> BTreeMap<String, Vec<u8>> {
+    let files = Mutex::new(BTreeMap::new());
+    let put = |name: &str, bytes: &[u8]| {
+        files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
+        Ok(())
+    };
+    with_work(|work| drop(write(&put, work).unwrap()));
+    files.into_inner().unwrap()
+}
+
+/// The same as text.
+pub(crate) fn texts<T>(write: impl FnOnce(&Put, &Work) -> Result<T, ExportError>) -> BTreeMap<String, String> {
+    files(write).into_iter().map(|(name, bytes)| (name, String::from_utf8(bytes).unwrap())).collect()
+}
+
+/// What comes of work on two threads.
+pub(crate) fn with_work<R>(run: impl FnOnce(&Work) -> R) -> R {
+    let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
+    run(&Work { workers: &workers, stop: &stop, tell: &|_| {} })
+}
 
 pub(crate) const GRID: ModuleGrid = ModuleGrid { rows: 1, cols: 2, side_cells: 20 };
 

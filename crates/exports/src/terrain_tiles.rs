@@ -239,25 +239,13 @@ fn bits(bits: impl Iterator<Item = bool>) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Mutex;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
 
     use super::*;
     use crate::samples;
 
     #[test]
     fn subtrees_have_a_bit_and_a_row_for_each_tile_that_there_is() {
-        let files = Mutex::new(BTreeMap::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-            Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-        write_3dtiles_terrain(&samples::with_hole(), None, &put, &work).unwrap();
-        let files = files.into_inner().unwrap();
+        let files = samples::files(|put, work| write_3dtiles_terrain(&samples::with_hole(), None, put, work));
         assert!(files.contains_key("holes.geojson"));
         let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
         let levels = tileset["root"]["children"][1]["implicitTiling"]["availableLevels"].as_u64().unwrap();

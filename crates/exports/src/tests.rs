@@ -1,16 +1,14 @@
 //! Exports read back by decoders of their own, and looked at from above.
 
-use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 use rusqlite::Connection;
-use schedule::Workers;
 use serde_json::Value;
 use terrain::{Draped, ModuleRect};
 
-use crate::{ByteRaster, Coordinates, ExportError, Mesh, Product, Put, TextureFile, Textures, Work, samples};
+use crate::samples::{self, files, with_work};
+use crate::{ByteRaster, Coordinates, Mesh, Product, TextureFile, Textures};
 
 /// A mesh of a binary glTF: its name and material, and its triangles with y up.
 struct Found {
@@ -96,22 +94,6 @@ fn glb(product: &Product) -> Vec<u8> {
     bytes
 }
 
-/// The files of an export that writes a folder.
-fn files(write: impl Fn(&Put, &Work) -> Result<(), ExportError>) -> BTreeMap<String, Vec<u8>> {
-    let files = Mutex::new(BTreeMap::new());
-    let put = |name: &str, bytes: &[u8]| {
-        files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-        Ok(())
-    };
-    with_work(|work| write(&put, work).unwrap());
-    files.into_inner().unwrap()
-}
-
-fn with_work(run: impl FnOnce(&Work)) {
-    let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-    run(&Work { workers: &workers, stop: &stop, tell: &|_| {} });
-}
-
 #[test]
 fn rays_from_above_meet_roofs_woods_and_the_ground_of_courtyards() {
     let product = samples::with_objects();
@@ -188,7 +170,7 @@ fn every_format_of_meshes_has_the_objects() {
     let flight = files(|put, work| crate::write_openflight(&product, put, work));
     let square = &flight["squares/r00c00.flt"];
     assert!(square.windows(10).any(|window| window == b"building_7") && square.windows(6).any(|w| w == b"wood_9"));
-    let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
+    let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work));
     let group = meshes(&tiles["groups/r0000c0000_r0000c0001.glb"]);
     assert!(group.iter().any(|mesh| mesh.node == "objects_r0000c0000_r0000c0001" && mesh.material == "wood_side"));
 }
@@ -357,10 +339,10 @@ fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
     // Texels of 3 m do not divide a load module of 500 m: they are a little larger.
     assert_eq!(texture(of(0), 3.0).1, 167);
     assert_eq!(texture(product.rect, 700.0).1, 3);
-    let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
+    let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work));
     let (document, _) = document(&tiles["groups/r0000c0000_r0000c0001.glb"]);
     assert_eq!(document["images"][0]["mimeType"], "image/jpeg");
-    let same = files(|put, work| crate::write_3dtiles(&product, None, put, work).map(|_| ()));
+    let same = files(|put, work| crate::write_3dtiles(&product, None, put, work));
     assert!(tiles == same);
 }
 

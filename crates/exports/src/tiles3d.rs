@@ -326,7 +326,6 @@ fn box_around(places: impl Iterator<Item = [f64; 3]>) -> [f64; 12] {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::Mutex;
     use std::sync::atomic::AtomicBool;
 
     use schedule::Workers;
@@ -336,15 +335,11 @@ mod tests {
 
     /// The files of a tileset.
     fn written(product: &Product) -> BTreeMap<String, Vec<u8>> {
-        let files = Mutex::new(BTreeMap::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
+        samples::files(|put, work| {
+            let datum = write_3dtiles(product, None, put, work)?;
+            assert_eq!(datum, Datum::Egm96);
             Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-        assert_eq!(write_3dtiles(product, None, &put, &work).unwrap(), Datum::Egm96);
-        files.into_inner().unwrap()
+        })
     }
 
     #[test]

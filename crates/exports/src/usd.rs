@@ -368,23 +368,12 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::Mutex;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
 
     use super::*;
     use crate::samples;
 
     fn files(product: &Product) -> BTreeMap<String, String> {
-        let files = Mutex::new(BTreeMap::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().insert(name.to_owned(), String::from_utf8(bytes.to_vec()).unwrap());
-            Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        write_usd(product, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
-        files.into_inner().unwrap()
+        samples::texts(|put, work| write_usd(product, put, work))
     }
 
     #[test]

@@ -256,7 +256,6 @@ fn about(product: &Product, layout: &Layout, samples: &Samples, off: Off) -> Val
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::Mutex;
     use std::sync::atomic::AtomicBool;
 
     use schedule::Workers;
@@ -265,14 +264,7 @@ mod tests {
     use crate::samples;
 
     fn files(product: &Product, engine: Engine, size: Option<usize>) -> BTreeMap<String, Vec<u8>> {
-        let files = Mutex::new(BTreeMap::new());
-        let put = |name: &str, bytes: &[u8]| {
-            files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-            Ok(())
-        };
-        let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-        write_heightmap(product, engine, size, &put, &Work { workers: &workers, stop: &stop, tell: &|_| {} }).unwrap();
-        files.into_inner().unwrap()
+        samples::files(|put, work| write_heightmap(product, engine, size, put, work))
     }
 
     fn values(raw: &[u8]) -> Vec<u16> {

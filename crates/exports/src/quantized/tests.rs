@@ -1,10 +1,5 @@
 //! Tests of whole exports, through a decoder of their own.
 
-use std::sync::Mutex;
-use std::sync::atomic::AtomicBool;
-
-use schedule::Workers;
-
 use super::*;
 use crate::samples;
 
@@ -103,15 +98,7 @@ fn slanted() -> Product {
 }
 
 fn exported(product: &Product) -> BTreeMap<String, Vec<u8>> {
-    let files = Mutex::new(BTreeMap::new());
-    let put = |name: &str, bytes: &[u8]| {
-        files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-        Ok(())
-    };
-    let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-    let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-    write_quantized_mesh(product, Some(Datum::Ellipsoid), &put, &work).unwrap();
-    files.into_inner().unwrap()
+    samples::files(|put, work| write_quantized_mesh(product, Some(Datum::Ellipsoid), put, work))
 }
 
 fn key(name: &str) -> (u32, i64, i64) {

@@ -1,20 +1,13 @@
 //! Whole files, read by other means than they were written with.
 
 use std::io::Cursor;
-use std::sync::atomic::AtomicBool;
 
 use rusqlite::Connection;
-use schedule::Workers;
 
 use super::*;
 use crate::samples;
 
 const MAP: WebMap = WebMap { encoding: HeightEncoding::Mapbox, pixels: 256 };
-
-fn worked<R>(run: impl FnOnce(&Work) -> R) -> R {
-    let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-    run(&Work { workers: &workers, stop: &stop, tell: &|_| {} })
-}
 
 /// Red, green and blue of each pixel.
 fn pixels(bytes: &[u8]) -> Vec<[u8; 3]> {
@@ -27,7 +20,7 @@ fn pixels(bytes: &[u8]) -> Vec<[u8; 3]> {
 #[test]
 fn a_pixel_has_the_height_of_the_triangle_under_its_middle_or_that_of_outside() {
     for product in [samples::product(), samples::with_hole()] {
-        let tiles = worked(|work| Pyramid::of(&product, MAP).unwrap().tiles(work)).unwrap();
+        let tiles = samples::with_work(|work| Pyramid::of(&product, MAP).unwrap().tiles(work)).unwrap();
         let earth = Earth::new(&product, None).unwrap();
         let (mut of_ground, mut outside) = (0, 0);
         for (square, bytes) in &tiles {
@@ -56,8 +49,8 @@ fn mbtiles_count_rows_from_the_south_and_say_how_heights_are_encoded() {
     let product = samples::product();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.mbtiles");
-    worked(|work| write_web_mbtiles(&path, &product, MAP, work)).unwrap();
-    let tiles = worked(|work| Pyramid::of(&product, MAP).unwrap().tiles(work)).unwrap();
+    samples::with_work(|work| write_web_mbtiles(&path, &product, MAP, work)).unwrap();
+    let tiles = samples::with_work(|work| Pyramid::of(&product, MAP).unwrap().tiles(work)).unwrap();
     let connection = Connection::open(&path).unwrap();
     let count: i64 = connection.query_row("SELECT count(*) FROM tiles", [], |row| row.get(0)).unwrap();
     assert_eq!(count as usize, tiles.len());
@@ -80,12 +73,12 @@ fn an_archive_has_a_header_its_tiles_in_order_and_the_same_bytes_every_time() {
     let product = samples::product();
     let archive = || {
         let mut out = Cursor::new(Vec::new());
-        worked(|work| write_pmtiles(&mut out, &product, MAP, work)).unwrap();
+        samples::with_work(|work| write_pmtiles(&mut out, &product, MAP, work)).unwrap();
         out.into_inner()
     };
     let bytes = archive();
     assert_eq!(bytes, archive());
-    let tiles = worked(|work| Pyramid::of(&product, MAP).unwrap().tiles(work)).unwrap();
+    let tiles = samples::with_work(|work| Pyramid::of(&product, MAP).unwrap().tiles(work)).unwrap();
     let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
     // Version 3, tiles in order, of PNG.
     assert_eq!((&bytes[..7], bytes[7], bytes[96], bytes[99]), (&b"PMTiles"[..], 3, 1, 2));

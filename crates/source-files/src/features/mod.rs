@@ -6,7 +6,7 @@
 //! kept, so what meets in the file meets here. What cannot be read is left out and told, feature by feature; only a
 //! file that cannot be read at all is an error.
 
-mod clip;
+pub(crate) mod clip;
 #[cfg(feature = "geoparquet")]
 mod columnar;
 mod columns;

@@ -28,7 +28,7 @@ use parquet::schema::types::Type;
 
 use crate::SourceError;
 use crate::crs::Crs;
-use crate::features::Extent;
+use crate::features::clip::Extent;
 use crate::limits::PARQUET_FOOTER_BYTES_MAX;
 use geo::Geo;
 use pages::Pages;
