@@ -1,32 +1,31 @@
 //! Many lines of sight from one place, as for a viewshed: the same answers as one by one, sooner.
 //!
-//! Ground that lies lower than the line above it needs no look at its triangles: the eye keeps the top of every load
-//! module and of every cell of those that it has looked at. And ground that hides a place hides most of the places
-//! beside it too, so it is asked first.
+//! What lies lower than the line above it needs no look at its triangles: the eye knows how steeply the cells of load
+//! modules rise before it, those that it has looked at, or, where it looks far, all around it. And ground that hides a
+//! place hides most of the places beside it too, so it is asked first.
 
-use std::cell::OnceCell;
+use std::sync::{Arc, OnceLock};
 
+use crate::horizon::{Horizon, Slope, Vantage};
 use crate::lookup::Lookup;
 use crate::object_lookups::ObjectLookups;
 use crate::past::{Stretch, below_top, entered, lost_in};
 use crate::sight::{Curvature, Line, crossed_at, hidden_in};
-use crate::{LoadedGround, Module, Standing, TerrainModule};
+use crate::{LoadedGround, QUANTA_PER_METRE, Standing, TerrainModule};
 
-/// Quanta by which ground must stay below a line to be left out: far more than rounding.
-const MARGIN: f64 = 2.0;
-
-/// An eye over loaded ground.
+/// An eye over loaded ground. A clone looks for itself, and shares what this one knows of the ground.
+#[derive(Clone)]
 pub struct Eye<'a> {
     ground: &'a LoadedGround,
     from_m: [f64; 3],
-    from: [f64; 3],
+    vantage: Vantage,
     curvature: Curvature,
     /// Whether it sees nothing at all: below the ground, or nowhere.
     is_blind: bool,
-    /// Of each load module the top in quanta, and those of its cells once they were asked for.
-    tops: Vec<(f64, OnceCell<Vec<i32>>)>,
-    /// The same of its objects.
-    object_tops: Vec<OnceCell<ObjectTops>>,
+    /// How steeply each load module rises, once it was asked for.
+    rises: Arc<[OnceLock<Rises>]>,
+    /// Of ground and decks, and of objects, where it looks far.
+    horizons: Option<Arc<[Horizon; 2]>>,
     /// The load module that hid the last place, by row and column.
     blocker: Option<[u32; 2]>,
     /// The load module whose prisms hid the last place that the ground did not hide.
@@ -34,38 +33,84 @@ pub struct Eye<'a> {
     stretches: Vec<Stretch>,
 }
 
-/// How high something rises in quanta: in all, and in each cell of what finds it.
-struct Tops {
-    highest: f64,
-    cells: Vec<i32>,
-}
+/// How high something rises: each cell of the lookup that finds it, row by row, and its top in quanta.
+type Tops = Vec<([[f64; 2]; 2], i32)>;
 
-impl Tops {
-    fn of(cells: Vec<i32>) -> Self {
-        Self { highest: cells.iter().copied().max().map_or(f64::NEG_INFINITY, f64::from), cells }
-    }
-}
-
-/// How high the objects of a load module rise: prisms, and what each lookup of canopies finds.
-struct ObjectTops {
+/// How high all of a load module rises.
+struct AllTops {
+    ground: Tops,
+    decks: Tops,
     prisms: Tops,
+    /// What each lookup of canopies finds.
     canopies: Vec<Tops>,
 }
 
-impl ObjectTops {
-    fn of(module: &TerrainModule, side: u16, ground: &[i32]) -> Self {
+impl AllTops {
+    /// Of a load module with this south-western corner.
+    fn of(module: &TerrainModule, side: u16, [x, y]: [f64; 2]) -> Self {
+        let with_cells = |lookup: &Lookup, tops: Vec<i32>| -> Tops {
+            let cell = |(cell, top)| {
+                let [[south, north], [west, east]] =
+                    [cell / lookup.across(), cell % lookup.across()].map(|row| lookup.lines_of(row, side));
+                ([[x + west, y + south], [x + east, y + north]], top)
+            };
+            (0..).zip(tops).map(cell).collect()
+        };
+        let highest = |lookup: &Lookup| {
+            let heights = |corners: [[i32; 3]; 3]| corners.map(|corner| corner[2]).into_iter().max();
+            with_cells(lookup, lookup.tops(|corners| heights(corners).unwrap_or(i32::MAX)))
+        };
         let (objects, ObjectLookups { prisms, canopies }) = (&module.module().objects, module.objects());
         let roof = |corners: [[i32; 3]; 3]| objects.prisms[corners[0][2] as usize].roof;
-        let prisms = Tops::of(prisms.as_ref().map_or_else(Vec::new, |prisms| prisms.tops(roof)));
+        let ground = highest(module.lookup());
         let crown = |corners: [[i32; 3]; 3]| {
             let [low, high] = [i32::min, i32::max].map(|end| {
                 [0, 1].map(|axis| f64::from(corners.map(|corner| corner[axis]).into_iter().reduce(end).unwrap_or(0)))
             });
             let cells = module.lookup().cells_within(side, [low, high]);
-            let under = cells.map(|[row, col]| ground[(row * module.lookup().across() + col) as usize]).max();
+            let under = cells.map(|[row, col]| ground[(row * module.lookup().across() + col) as usize].1).max();
             under.unwrap_or(i32::MAX).saturating_add(objects.canopies[corners[0][2] as usize].height.into())
         };
-        Self { prisms, canopies: canopies.iter().map(|canopies| Tops::of(canopies.tops(crown))).collect() }
+        Self {
+            decks: module.decks().map(highest).unwrap_or_default(),
+            prisms: prisms.as_ref().map(|prisms| with_cells(prisms, prisms.tops(roof))).unwrap_or_default(),
+            canopies: canopies.iter().map(|canopies| with_cells(canopies, canopies.tops(crown))).collect(),
+            ground,
+        }
+    }
+}
+
+/// How steeply all of a load module rises before an eye, and how far it is, at its nearest and its furthest, in quanta.
+struct Rises {
+    reach: [f64; 2],
+    ground: Slopes,
+    decks: Slopes,
+    prisms: Slopes,
+    canopies: Vec<Slopes>,
+}
+
+/// Slopes of the cells of a lookup, row by row, and the largest of them.
+struct Slopes {
+    highest: Slope,
+    cells: Vec<Slope>,
+}
+
+impl Rises {
+    fn of(vantage: &Vantage, reach: [f64; 2], tops: &AllTops) -> Self {
+        let slopes = |tops: &Tops| {
+            let cells = tops.iter().map(|&(cell, top)| vantage.slope(vantage.reach(cell), f64::from(top)));
+            let cells: Vec<Slope> = cells.collect();
+            Slopes { highest: cells.iter().copied().fold(Slope::NONE, Slope::max), cells }
+        };
+        let [ground, decks, prisms] = [&tops.ground, &tops.decks, &tops.prisms].map(slopes);
+        Self { reach, ground, decks, prisms, canopies: tops.canopies.iter().map(slopes).collect() }
+    }
+}
+
+impl Slopes {
+    /// Whether what stands so many quanta high on the triangles of a cell may rise above a line of a slope.
+    fn may_rise(&self, lookup: &Lookup, up: u16, line: f64, [row, col]: [u32; 2]) -> bool {
+        self.cells[(row * lookup.across() + col) as usize].may_rise(up, line)
     }
 }
 
@@ -73,32 +118,57 @@ impl LoadedGround {
     /// An eye at a place: an easting, a northing and a height above the vertical datum.
     pub fn eye(&self, from_m: [f64; 3], curvature: Curvature) -> Eye<'_> {
         let is_blind = self.is_beyond_any_ground(from_m) || self.is_below(from_m);
-        let top = |module: &Module| module.vertices.iter().map(|vertex| vertex.z).max().unwrap_or(i32::MIN);
-        let tops = self.modules().iter().map(|module| (f64::from(top(module.module())), OnceCell::new())).collect();
-        let object_tops = self.modules().iter().map(|_| OnceCell::new()).collect();
-        let from = self.quanta(from_m);
-        let (blocker, prism_blocker, stretches) = (None, None, Vec::new());
-        Eye { ground: self, from_m, from, curvature, is_blind, tops, object_tops, blocker, prism_blocker, stretches }
+        let fall = curvature.per_metre() / f64::from(QUANTA_PER_METRE);
+        let vantage = Vantage { place: self.quanta(from_m), fall };
+        let rises = self.modules().iter().map(|_| OnceLock::new()).collect();
+        let (horizons, blocker, prism_blocker, stretches) = (None, None, None, Vec::new());
+        Eye { ground: self, from_m, vantage, curvature, is_blind, rises, horizons, blocker, prism_blocker, stretches }
     }
 }
 
 impl Eye<'_> {
+    /// The same eye, which knows all around it so many metres far: sooner for thousands of places.
+    #[must_use]
+    pub fn looking_far(self, range_m: f64) -> Self {
+        if self.is_blind {
+            return self;
+        }
+        let range = range_m * f64::from(QUANTA_PER_METRE);
+        let mut horizons = [0, 1].map(|_| Horizon::new(self.vantage, range));
+        for index in 0..self.rises.len() {
+            let reach = self.vantage.reach(self.rectangle(index));
+            if horizons[0].end() < reach[0] {
+                continue;
+            }
+            let tops = AllTops::of(&self.ground.modules()[index], self.ground.frame().side, self.rectangle(index)[0]);
+            let mut add = |which: usize, tops: &Tops| {
+                tops.iter().for_each(|&(cell, top)| horizons[which].add(cell, f64::from(top)));
+            };
+            add(0, &tops.ground);
+            add(0, &tops.decks);
+            add(1, &tops.prisms);
+            tops.canopies.iter().for_each(|tops| add(1, tops));
+            self.rises[index].get_or_init(|| Rises::of(&self.vantage, reach, &tops));
+        }
+        Self { horizons: Some(Arc::new(horizons.map(Horizon::closed))), ..self }
+    }
+
     /// Whether nothing stands between the eye and a place: exactly whether [`LoadedGround::sight_over`] is free.
     pub fn sees(&mut self, to_m: [f64; 3]) -> bool {
         if self.is_blind || self.ground.is_beyond_any_ground(to_m) {
             return false;
         }
-        let to = self.ground.quanta(to_m);
-        if self.blocker.is_some_and(|[row, col]| self.is_hidden_by(row, col, to)) {
+        let ray = self.ray(to_m, 0);
+        if self.blocker.is_some_and(|[row, col]| self.is_hidden_by(row, col, &ray)) {
             return false;
         }
         self.blocker = None;
-        for [row, col] in self.ground.modules_along(self.from, to) {
+        for [row, col] in self.ground.modules_along(self.vantage.place, ray.to) {
             let inside = u32::try_from(row).ok().zip(u32::try_from(col).ok());
             let Some((row, col)) = inside.filter(|&(row, col)| self.ground.block().contains(row, col)) else {
                 return false;
             };
-            if self.is_hidden_by(row, col, to) {
+            if self.is_hidden_by(row, col, &ray) {
                 self.blocker = Some([row, col]);
                 return false;
             }
@@ -112,22 +182,22 @@ impl Eye<'_> {
         if standing == Standing::None {
             return 1.0;
         }
-        let to = self.ground.quanta(to_m);
-        if self.prism_blocker.is_some_and(|[row, col]| self.is_behind_prisms(row, col, to)) {
+        let ray = self.ray(to_m, 1);
+        if self.prism_blocker.is_some_and(|[row, col]| self.is_behind_prisms(row, col, &ray)) {
             return 0.0;
         }
         self.prism_blocker = None;
         let length_m = (0..3).map(|axis| (to_m[axis] - self.from_m[axis]).powi(2)).sum::<f64>().sqrt();
         let (most, mut lost) = (-0.005_f64.ln(), 0.0);
         // What hides a place stands before it more often than before the eye.
-        for [row, col] in self.ground.modules_along(to, self.from) {
+        for [row, col] in self.ground.modules_along(ray.to, self.vantage.place) {
             let (row, col) = (row as u32, col as u32);
-            if self.is_behind_prisms(row, col, to) {
+            if self.is_behind_prisms(row, col, &ray) {
                 self.prism_blocker = Some([row, col]);
                 return 0.0;
             }
             if standing == Standing::All {
-                lost += self.lost_in_canopies(row, col, to, length_m);
+                lost += self.lost_in_canopies(row, col, &ray, length_m);
             }
             if most < lost {
                 return 0.0;
@@ -136,31 +206,57 @@ impl Eye<'_> {
         (-lost).exp()
     }
 
-    /// A load module with objects that is loaded, the tops of its ground and of its objects, and the line to a place in
-    /// quanta over it.
-    fn past_objects(&self, row: u32, col: u32, to: [f64; 3]) -> Option<(&TerrainModule, &[i32], &ObjectTops, Line)> {
-        let (ground, side) = (self.ground, self.ground.frame().side);
-        let index = ground.block().contains(row, col).then(|| ground.block().index(row, col))?;
-        let module = &*ground.modules()[index];
-        if module.module().objects.is_empty() {
-            return None;
-        }
-        let of_ground = self.tops[index].1.get_or_init(|| tops_of(module.lookup()));
-        let tops = self.object_tops[index].get_or_init(|| ObjectTops::of(module, side, of_ground));
-        let corner = [col, row].map(|index| f64::from(index) * f64::from(side));
-        Some((module, of_ground, tops, Line::in_module(corner, self.from, to, self.curvature)))
+    /// The eye's own place.
+    pub fn place_m(&self) -> [f64; 3] {
+        self.from_m
     }
 
-    fn is_behind_prisms(&self, row: u32, col: u32, to: [f64; 3]) -> bool {
+    /// The line to a place, which one of the horizons leaves free.
+    fn ray(&self, to_m: [f64; 3], horizon: usize) -> Ray {
+        let to = self.ground.quanta(to_m);
+        let horizon = self.horizons.as_ref().map(|horizons| &horizons[horizon]);
+        let free = horizon.map_or([0.0; 2], |horizon| [horizon.begin(), horizon.clear_to(to)]);
+        Ray { to, slope: self.vantage.slope_to(to), free }
+    }
+
+    /// The south-western and the north-eastern corner of a load module, in quanta.
+    fn rectangle(&self, index: usize) -> [[f64; 2]; 2] {
+        let (block, side) = (self.ground.block(), f64::from(self.ground.frame().side));
+        let [row, col] = block.place(index);
+        let corner = [col, row].map(|index| f64::from(index) * side);
+        [corner, corner.map(|axis| axis + side)]
+    }
+
+    /// A load module, how steeply it rises, and the line to a place over it; `None` where it rises nowhere above that.
+    fn past(&self, index: usize, ray: &Ray) -> Option<(&TerrainModule, &Rises, Line)> {
+        let rectangle = self.rectangle(index);
+        let module = &*self.ground.modules()[index];
+        let rises = self.rises[index].get_or_init(|| {
+            let tops = AllTops::of(module, self.ground.frame().side, rectangle[0]);
+            Rises::of(&self.vantage, self.vantage.reach(rectangle), &tops)
+        });
+        let is_free = ray.free[0] <= rises.reach[0] && rises.reach[1] <= ray.free[1];
+        (!is_free).then(|| (module, rises, Line::in_module(rectangle[0], self.vantage.place, ray.to, self.curvature)))
+    }
+
+    /// The same for its objects, where it is loaded and has some.
+    fn past_objects(&self, row: u32, col: u32, ray: &Ray) -> Option<(&TerrainModule, &Rises, Line)> {
+        let block = self.ground.block();
+        let index = block.contains(row, col).then(|| block.index(row, col))?;
+        let has_some = !self.ground.modules()[index].module().objects.is_empty();
+        has_some.then(|| self.past(index, ray)).flatten()
+    }
+
+    fn is_behind_prisms(&self, row: u32, col: u32, ray: &Ray) -> bool {
         let side = self.ground.frame().side;
-        let Some((module, _, tops, line)) = self.past_objects(row, col, to) else { return false };
+        let Some((module, rises, line)) = self.past_objects(row, col, ray) else { return false };
         let Some(lookup) = &module.objects().prisms else { return false };
-        if is_above(&line, [0.0; 2], [f64::from(side); 2], tops.prisms.highest) {
+        if !rises.prisms.highest.may_rise(0, ray.slope) {
             return false;
         }
         let prisms = &module.module().objects.prisms;
         let (mut is_hidden, mut last) = (false, usize::MAX);
-        let wanted = |row, col| may_rise(lookup, side, (&tops.prisms.cells, 0), &line, [row, col]);
+        let wanted = |row, col| rises.prisms.may_rise(lookup, 0, ray.slope, [row, col]);
         lookup.triangles_along_in(side, line.start, line.end, wanted, |corners| {
             let number = corners[0][2] as usize;
             if !is_hidden && number != std::mem::replace(&mut last, number) {
@@ -171,18 +267,18 @@ impl Eye<'_> {
     }
 
     /// The logarithm of the share of light that the canopies of one load module take.
-    fn lost_in_canopies(&mut self, row: u32, col: u32, to: [f64; 3], length_m: f64) -> f64 {
+    fn lost_in_canopies(&mut self, row: u32, col: u32, ray: &Ray, length_m: f64) -> f64 {
         let mut stretches = std::mem::take(&mut self.stretches);
         stretches.clear();
         let side = self.ground.frame().side;
-        if let Some((module, ground, tops, line)) = self.past_objects(row, col, to) {
+        if let Some((module, rises, line)) = self.past_objects(row, col, ray) {
             // Where the line stays above all crowns over a cell of the ground, it is in no wood there.
-            let wanted = |height, row, col| may_rise(module.lookup(), side, (ground, height), &line, [row, col]);
-            for (lookup, tops) in module.objects().canopies.iter().zip(&tops.canopies) {
-                if is_above(&line, [0.0; 2], [f64::from(side); 2], tops.highest) {
+            let wanted = |height, row, col| rises.ground.may_rise(module.lookup(), height, ray.slope, [row, col]);
+            for (lookup, slopes) in module.objects().canopies.iter().zip(&rises.canopies) {
+                if !slopes.highest.may_rise(0, ray.slope) {
                     continue;
                 }
-                let crowns = |row, col| may_rise(lookup, side, (&tops.cells, 0), &line, [row, col]);
+                let crowns = |row, col| slopes.may_rise(lookup, 0, ray.slope, [row, col]);
                 lookup.triangles_along_in(side, line.start, line.end, crowns, |corners| {
                     below_top(module, side, &line, &corners, wanted, &mut stretches);
                 });
@@ -193,47 +289,26 @@ impl Eye<'_> {
         lost
     }
 
-    /// The eye's own place.
-    pub fn place_m(&self) -> [f64; 3] {
-        self.from_m
-    }
-
-    /// Whether a load module that is loaded stands between the eye and a place in quanta.
-    fn is_hidden_by(&self, row: u32, col: u32, to: [f64; 3]) -> bool {
-        let (ground, side) = (self.ground, self.ground.frame().side);
-        let index = ground.block().index(row, col);
-        let (module, (top, tops)) = (&ground.modules()[index], &self.tops[index]);
-        let wide = f64::from(side);
-        let line = Line::in_module([f64::from(col) * wide, f64::from(row) * wide], self.from, to, self.curvature);
+    /// Whether a load module that is loaded stands between the eye and a place.
+    fn is_hidden_by(&self, row: u32, col: u32, ray: &Ray) -> bool {
+        let side = self.ground.frame().side;
+        let Some((module, rises, line)) = self.past(self.ground.block().index(row, col), ray) else { return false };
         if let Some(decks) = module.decks()
+            && rises.decks.highest.may_rise(0, ray.slope)
             && crossed_at(decks, side, &line).is_finite()
         {
             return true;
         }
-        if is_above(&line, [0.0; 2], [wide; 2], *top) {
-            return false;
-        }
         let lookup = module.lookup();
-        let tops = tops.get_or_init(|| tops_of(lookup));
-        hidden_in(lookup, side, &line, |row, col| may_rise(lookup, side, (tops, 0), &line, [row, col])).is_finite()
+        let wanted = |row, col| rises.ground.may_rise(lookup, 0, ray.slope, [row, col]);
+        rises.ground.highest.may_rise(0, ray.slope) && hidden_in(lookup, side, &line, wanted).is_finite()
     }
 }
 
-/// Of each cell, row by row, the height in quanta that no triangle which touches it rises above.
-fn tops_of(lookup: &Lookup) -> Vec<i32> {
-    lookup.tops(|corners| corners.map(|corner| corner[2]).into_iter().max().unwrap_or(i32::MIN))
-}
-
-/// Whether a line stays above a height wherever it lies over a rectangle.
-fn is_above(line: &Line, low: [f64; 2], high: [f64; 2], top: f64) -> bool {
-    let shares = line.shares_over(low, high);
-    // Rounding may say that it passes by where it touches a corner.
-    shares[0] <= shares[1] && top + MARGIN < line.lowest(shares)
-}
-
-/// Whether what stands so many quanta high on the triangles of a cell may rise above a line.
-fn may_rise(lookup: &Lookup, side: u16, (tops, up): (&[i32], u16), line: &Line, [row, col]: [u32; 2]) -> bool {
-    let ([south, north], [west, east]) = (lookup.lines_of(row, side), lookup.lines_of(col, side));
-    let top = f64::from(tops[(row * lookup.across() + col) as usize]) + f64::from(up);
-    !is_above(line, [west, south], [east, north], top)
+/// The line from an eye to a place in quanta.
+struct Ray {
+    to: [f64; 3],
+    slope: f64,
+    /// Between which distances it surely stays above everything.
+    free: [f64; 2],
 }

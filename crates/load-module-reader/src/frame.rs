@@ -113,4 +113,10 @@ impl Block {
     pub fn index(&self, row: u32, col: u32) -> usize {
         (row - self.south) as usize * (self.east - self.west) as usize + (col - self.west) as usize
     }
+
+    /// Row and column of the load module at an index inside.
+    pub(crate) fn place(&self, index: usize) -> [u32; 2] {
+        let cols = (self.east - self.west) as usize;
+        [self.south + (index / cols) as u32, self.west + (index % cols) as u32]
+    }
 }

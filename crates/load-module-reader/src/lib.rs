@@ -77,6 +77,7 @@ mod error;
 pub use error::{ReadError, Section};
 mod bytes;
 mod header;
+mod horizon;
 pub use header::Header;
 mod vertex;
 pub use vertex::Vertex;

@@ -62,22 +62,6 @@ impl Line {
         self.height(first).min(self.height(last)) - self.sag * bow * bow / 4.0
     }
 
-    /// The first and the last share of it over a rectangle, in quanta from the load module's corner; the first is the
-    /// larger one where it passes by.
-    pub(crate) fn shares_over(&self, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
-        let (mut first, mut last) = (0.0_f64, 1.0_f64);
-        for axis in 0..2 {
-            if self.along[axis] == 0.0 {
-                continue;
-            }
-            let at = |side: f64| (side - self.start[axis]) / self.along[axis];
-            let (a, b) = (at(low[axis]), at(high[axis]));
-            first = first.max(a.min(b));
-            last = last.min(a.max(b));
-        }
-        [first, last]
-    }
-
     /// Where the straight ground between two of its edges rises highest above a line that sags, and by how much; the
     /// edges themselves are looked at elsewhere.
     fn highest_between(&self, corners: &Corners) -> Option<[f64; 2]> {

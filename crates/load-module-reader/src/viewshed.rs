@@ -54,7 +54,7 @@ impl Viewshed {
     pub fn eye<'a>(&self, ground: &'a LoadedGround) -> Option<Eye<'a>> {
         let [east, north] = self.place_m;
         let height_m = ground.height_m(self.place_m)?;
-        Some(ground.eye([east, north, height_m + self.eye_m], self.curvature))
+        Some(ground.eye([east, north, height_m + self.eye_m], self.curvature).looking_far(self.range_m))
     }
 
     /// What is seen of row `row`, counted from the north, from west to east.

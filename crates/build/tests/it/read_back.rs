@@ -53,11 +53,12 @@ fn the_reader_sees_what_fidelity_measures() {
             let [east, north] = [0, 1].map(|axis| origin_m[axis] + post_m * place[axis]);
             [east, north, ground.height_m([east, north]).unwrap() + EYE_M]
         };
-        let mut eye = ground.eye(stands(from), Curvature::NONE);
+        let eye = ground.eye(stands(from), Curvature::NONE);
+        let mut eyes = [eye.clone(), eye.looking_far(3000.0)];
         for to in (0..200).map(|_| place()) {
             let expected = sees_on(&triangles, [from, to]);
             assert_eq!(ground.sight(stands(from), stands(to)) == Sight::Free, expected, "{from:?} {to:?}");
-            assert_eq!(eye.sees(stands(to)), expected, "{from:?} {to:?}");
+            assert_eq!(eyes.each_mut().map(|eye| eye.sees(stands(to))), [expected; 2], "{from:?} {to:?}");
             seen += u32::from(expected);
         }
     }

@@ -34,11 +34,13 @@ fn an_eye_sees_exactly_what_lines_of_sight_say() {
                 [CORNER[0] + x, CORNER[1] + y, height_m + up * draw.f64() - 0.1]
             };
             let from = place(80.0);
-            let mut eye = ground.eye(from, curvature);
+            let eye = ground.eye(from, curvature);
+            // To less than it looks at, and beyond.
+            let mut eyes = [eye.clone(), eye.clone().looking_far(300.0), eye.looking_far(2000.0)];
             for _ in 0..200 {
                 let to = place(12.0);
                 let expected = ground.sight_over(from, to, curvature) == Sight::Free;
-                assert_eq!(eye.sees(to), expected, "from {from:?} to {to:?}");
+                assert_eq!(eyes.each_mut().map(|eye| eye.sees(to)), [expected; 3], "from {from:?} to {to:?}");
                 seen += u32::from(expected);
             }
         }

@@ -364,17 +364,19 @@ fn an_eye_past_objects_sees_what_single_lines_say() {
                 [CORNER[0] + x, CORNER[1] + y, height_m + up * draw.f64()]
             };
             let from = place(120.0);
-            let mut eye = ground.eye(from, curvature);
+            let eye = ground.eye(from, curvature);
+            let mut eyes = [eye.clone(), eye.looking_far(700.0)];
             for _ in 0..200 {
                 let to = place(30.0);
-                if !eye.sees(to) {
+                if !eyes.each_mut().map(|eye| eye.sees(to))[0] {
                     counts[0] += 1;
                     continue;
                 }
                 for standing in [Standing::None, Standing::Buildings, Standing::All] {
                     let all = ground.sight_past(from, to, &PastObjects { standing, least: 1e-9, curvature });
                     let expected = if all.sight == Sight::Free { all.transmission } else { 0.0 };
-                    let light = eye.light(to, standing);
+                    let [light, far] = eyes.each_mut().map(|eye| eye.light(to, standing));
+                    assert!((light - far).abs() < 1e-12, "{light}, looking far {far}");
                     assert!((light - expected).abs() < 1e-9 || light == 0.0 && expected < 0.005, "{light} {all:?}");
                     counts[if expected == 0.0 { 1 } else { 2 + usize::from(expected < 1.0) }] += 1;
                 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use clap::Args;
 use exports::{ByteRaster, write_byte_raster};
 use load_module_reader::{
-    Area, Curvature, Hider, LoadedGround, Look, PastObjects, SEEN, Sight, Standing, TerrainModule, Viewshed,
+    Area, Curvature, Eye, Hider, LoadedGround, Look, PastObjects, SEEN, Sight, Standing, TerrainModule, Viewshed,
 };
 use schedule::{Workers, for_each_piece};
 use terrain::Spacing;
@@ -215,11 +215,9 @@ fn around(
         return Err(Failure::new(message, "ask for a larger --spacing or a smaller --range"));
     }
     files::check_writable(out)?;
-    if !area.frame().holds([east, north]) {
-        return Err(places::outside("--from", [east, north], area.frame()));
-    }
     let ground = places::ground_around(area, &[[east, north]], range_m)?;
-    let looks = Looks { viewshed, ground: &ground, workers: Workers::new(arguments.workers.count()) };
+    let eye = viewshed.eye(&ground).ok_or_else(|| places::outside("--from", [east, north], area.frame()))?;
+    let looks = Looks { viewshed, ground: &ground, eye, workers: Workers::new(arguments.workers.count()) };
     let seen = match kind {
         Kind::Tiff => write_tiff(&looks, spacing, out)?,
         Kind::Png => write_png(&looks, out)?,
@@ -232,6 +230,7 @@ fn around(
 struct Looks<'a> {
     viewshed: Viewshed,
     ground: &'a LoadedGround,
+    eye: Eye<'a>,
     workers: Workers,
 }
 
@@ -250,7 +249,7 @@ impl Looks<'_> {
         for_each_piece(&self.workers, pieces, &|piece| {
             let start = first + piece * ROWS_AT_ONCE;
             let rows = start..=(start + ROWS_AT_ONCE - 1).min(last);
-            let Some(mut eye) = self.viewshed.eye(self.ground) else { return };
+            let mut eye = self.eye.clone();
             let looks = rows.flat_map(|row| self.viewshed.row(self.ground, &mut eye, row as u64)).collect();
             found.lock().unwrap_or_else(PoisonError::into_inner)[piece] = looks;
         });

@@ -1,0 +1,166 @@
+//! How steeply things rise before an eye: what stays lower than the line to a place cannot hide it.
+//!
+//! Heights are taken less what the earth falls away at their distance. Then a line of sight over a curved earth is
+//! straight, and a thing stands above it exactly where its slope from the eye is larger than that of the line.
+
+use std::cmp::Ordering;
+
+use crate::QUANTA_PER_METRE;
+
+/// Quanta by which a thing must stay below a line to be left out: far more than rounding.
+const MARGIN: f64 = 2.0;
+
+/// An eye in quanta, and how many quanta the earth falls away at a quantum's distance; it falls with the square of that.
+#[derive(Clone, Copy)]
+pub(crate) struct Vantage {
+    pub place: [f64; 3],
+    pub fall: f64,
+}
+
+/// The largest slope from an eye at which something over a rectangle may rise.
+#[derive(Clone, Copy)]
+pub(crate) struct Slope {
+    rise: f32,
+    /// What a quantum more of height adds to it.
+    per_quantum: f32,
+}
+
+impl Vantage {
+    /// The slope at which the line to a place leaves the eye.
+    pub(crate) fn slope_to(&self, to: [f64; 3]) -> f64 {
+        let far = (to[0] - self.place[0]).hypot(to[1] - self.place[1]);
+        (to[2] - self.place[2]) / far - self.fall * far
+    }
+
+    /// How far a rectangle is from the eye, at its nearest and at its furthest.
+    pub(crate) fn reach(&self, [low, high]: [[f64; 2]; 2]) -> [f64; 2] {
+        let offs = [0, 1].map(|axis| [low[axis] - self.place[axis], self.place[axis] - high[axis]]);
+        let near = offs.map(|[below, above]| below.max(above).max(0.0));
+        let far = offs.map(|[below, above]| below.abs().max(above.abs()));
+        [near[0].hypot(near[1]), far[0].hypot(far[1])]
+    }
+
+    /// The slope of what is nowhere higher than `top` between two distances.
+    pub(crate) fn slope(&self, [near, far]: [f64; 2], top: f64) -> Slope {
+        let up = top + MARGIN - self.place[2];
+        let rise = up / if 0.0 <= up { near } else { far } - self.fall * near;
+        Slope { rise: rise as f32, per_quantum: near.recip() as f32 }
+    }
+}
+
+impl Slope {
+    /// What rises nowhere.
+    pub(crate) const NONE: Self = Self { rise: f32::NEG_INFINITY, per_quantum: 0.0 };
+
+    /// Whether what is so many quanta higher may still rise above a line of a slope.
+    pub(crate) fn may_rise(self, up: u16, line: f64) -> bool {
+        let rise = self.rise + f32::from(up) * self.per_quantum;
+        // What is no number may.
+        f64::from(rise).partial_cmp(&line) != Some(Ordering::Less)
+    }
+
+    /// The larger of two.
+    pub(crate) fn max(self, other: Self) -> Self {
+        Self { rise: self.rise.max(other.rise), per_quantum: self.per_quantum.max(other.per_quantum) }
+    }
+}
+
+/// Directions around an eye that are told apart.
+const SECTORS: usize = 2048;
+/// Rings around an eye that are told apart, at most.
+const RINGS: f64 = 256.0;
+/// Quanta across a ring, at least.
+const WIDTH_MIN: f64 = 25.0 * QUANTA_PER_METRE as f64;
+
+/// How far lines of sight from an eye stay above everything, whatever their slope: not before the first ring ends, since
+/// all directions meet there.
+#[derive(Clone)]
+pub(crate) struct Horizon {
+    vantage: Vantage,
+    /// Quanta across a ring.
+    width: f64,
+    rings: usize,
+    /// Of each sector, ring by ring from the second, the largest slope of what stands in it or nearer.
+    rises: Vec<f32>,
+}
+
+impl Horizon {
+    /// Nothing yet, within so many quanta.
+    pub(crate) fn new(vantage: Vantage, range: f64) -> Self {
+        let width = (range / RINGS).max(WIDTH_MIN);
+        let rings = (range / width).max(0.0) as usize;
+        Self { vantage, width, rings, rises: vec![f32::NEG_INFINITY; SECTORS * rings] }
+    }
+
+    /// The end of the first ring.
+    pub(crate) fn begin(&self) -> f64 {
+        self.width
+    }
+
+    /// The end of the last ring.
+    pub(crate) fn end(&self) -> f64 {
+        self.width * (self.rings + 1) as f64
+    }
+
+    /// Lets something stand over a rectangle, nowhere higher than `top`.
+    pub(crate) fn add(&mut self, rectangle: [[f64; 2]; 2], top: f64) {
+        let [near, far] = self.vantage.reach(rectangle);
+        let first = near.max(self.width);
+        let rings = (first / self.width) as usize - 1..self.rings.min((far / self.width) as usize);
+        if rings.is_empty() {
+            return;
+        }
+        let rise = self.vantage.slope([first, far.max(first)], top).rise;
+        let [low, high] = rectangle;
+        let [east, north] = [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0 - self.vantage.place[axis]);
+        let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+        // Left or right of the middle, which the eye sees straight ahead.
+        let aside = corners.map(|corner| {
+            let [x, y] = [0, 1].map(|axis| corner[axis] - self.vantage.place[axis]);
+            (east * y - north * x).atan2(east * x + north * y)
+        });
+        let ends = [aside.iter().copied().fold(0.0, f64::min), aside.iter().copied().fold(0.0, f64::max)];
+        let sectors = if near == 0.0 {
+            0..=SECTORS - 1
+        } else {
+            let [right, left] = [ends[0] - ROUNDING, ends[1] + ROUNDING].map(|end| turn(north.atan2(east) + end));
+            right as usize..=right as usize + (left.floor() - right.floor()).rem_euclid(SECTORS as f64) as usize
+        };
+        for sector in sectors {
+            let row = &mut self.rises[sector % SECTORS * self.rings..][..self.rings];
+            row[rings.clone()].iter_mut().for_each(|highest| *highest = highest.max(rise));
+        }
+    }
+
+    /// The same, in which what stands nearer counts for all that is further away; nothing is added from here on.
+    pub(crate) fn closed(mut self) -> Self {
+        for sector in self.rises.chunks_mut(self.rings.max(1)) {
+            let mut highest = f32::NEG_INFINITY;
+            for rise in sector {
+                highest = highest.max(*rise);
+                *rise = highest;
+            }
+        }
+        self
+    }
+
+    /// How far the line to a place stays above everything, from the end of the first ring.
+    pub(crate) fn clear_to(&self, to: [f64; 3]) -> f64 {
+        let slope = self.vantage.slope_to(to);
+        let [east, north] = [0, 1].map(|axis| to[axis] - self.vantage.place[axis]);
+        let sector = turn(north.atan2(east)) as usize;
+        let sector = &self.rises[sector * self.rings..][..self.rings];
+        let clear = sector.partition_point(|&rise| f64::from(rise) < slope);
+        self.width * (clear + 1) as f64
+    }
+}
+
+/// Radians by which a direction may be off.
+const ROUNDING: f64 = 1e-9;
+
+/// A direction in radians as a place among the sectors.
+fn turn(radians: f64) -> f64 {
+    let turn = (radians / std::f64::consts::TAU).rem_euclid(1.0) * SECTORS as f64;
+    // Rounding may come to a whole turn.
+    if turn < SECTORS as f64 { turn } else { 0.0 }
+}
