@@ -38,6 +38,10 @@ export CARGO_TARGET_DIR=$home CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=none C
 CARGO_ZIGBUILD_ZIG_PATH=$(echo "$tools"/lib/python3*/site-packages/ziglang/zig)
 export CARGO_ZIGBUILD_ZIG_PATH CARGO_ZIGBUILD_CACHE_DIR=$home/zig
 export ZIG_GLOBAL_CACHE_DIR=$home/zig ZIG_LOCAL_CACHE_DIR=$home/zig
+# Debian's standard library asks GCC's protection of stacks to be linked, which Zig has inside: two archives of nothing.
+mkdir -p "$home/empty"
+for name in libssp.a libssp_nonshared.a; do printf '!<arch>\n' >"$home/empty/$name"; done
+export CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUSTFLAGS="-L native=$home/empty"
 
 # One command of cargo for a target.
 zig() {

@@ -4,13 +4,14 @@
 //! modules rise before it, those that it has looked at, or, where it looks far, all around it. And ground that hides a
 //! place hides most of the places beside it too, so it is asked first.
 
+use std::cell::Cell;
 use std::sync::{Arc, OnceLock};
 
 use crate::horizon::{Horizon, Slope, Vantage};
-use crate::lookup::Lookup;
+use crate::lookup::{Corners, Lookup};
 use crate::object_lookups::ObjectLookups;
-use crate::past::{Stretch, below_top, entered, lost_in};
-use crate::sight::{Curvature, Line, crossed_at, hidden_in};
+use crate::past::{Part, Stretch, entered, in_canopies, lost_in, over_canopies};
+use crate::sight::{Curvature, Line, crossed_at, risen_at};
 use crate::{LoadedGround, QUANTA_PER_METRE, Standing, TerrainModule};
 
 /// An eye over loaded ground. A clone looks for itself, and shares what this one knows of the ground.
@@ -26,10 +27,12 @@ pub struct Eye<'a> {
     rises: Arc<[OnceLock<Rises>]>,
     /// Of ground and decks, and of objects, where it looks far.
     horizons: Option<Arc<[Horizon; 2]>>,
-    /// The load module that hid the last place, by row and column.
-    blocker: Option<[u32; 2]>,
+    /// The load module that hid the last place, by row and column, and the triangle of its ground that did.
+    blocker: Option<([u32; 2], Option<Corners>)>,
     /// The load module whose prisms hid the last place that the ground did not hide.
     prism_blocker: Option<[u32; 2]>,
+    /// Room for what is found along a line.
+    parts: Vec<Part>,
     stretches: Vec<Stretch>,
 }
 
@@ -121,8 +124,19 @@ impl LoadedGround {
         let fall = curvature.per_metre() / f64::from(QUANTA_PER_METRE);
         let vantage = Vantage { place: self.quanta(from_m), fall };
         let rises = self.modules().iter().map(|_| OnceLock::new()).collect();
-        let (horizons, blocker, prism_blocker, stretches) = (None, None, None, Vec::new());
-        Eye { ground: self, from_m, vantage, curvature, is_blind, rises, horizons, blocker, prism_blocker, stretches }
+        Eye {
+            ground: self,
+            from_m,
+            vantage,
+            curvature,
+            is_blind,
+            rises,
+            horizons: None,
+            blocker: None,
+            prism_blocker: None,
+            parts: Vec::new(),
+            stretches: Vec::new(),
+        }
     }
 }
 
@@ -142,7 +156,7 @@ impl Eye<'_> {
             }
             let tops = AllTops::of(&self.ground.modules()[index], self.ground.frame().side, self.rectangle(index)[0]);
             let mut add = |which: usize, tops: &Tops| {
-                tops.iter().for_each(|&(cell, top)| horizons[which].add(cell, f64::from(top)));
+                tops.iter().for_each(|&(cell, top)| horizons[which].add(cell, top));
             };
             add(0, &tops.ground);
             add(0, &tops.decks);
@@ -159,17 +173,24 @@ impl Eye<'_> {
             return false;
         }
         let ray = self.ray(to_m, 0);
-        if self.blocker.is_some_and(|[row, col]| self.is_hidden_by(row, col, &ray)) {
-            return false;
+        if let Some(([row, col], corners)) = self.blocker.take() {
+            let line = self.line(self.ground.block().index(row, col), &ray);
+            if corners.is_some_and(|corners| 0.0 < line.length_squared && risen_at(&corners, &line).is_finite()) {
+                self.blocker = Some(([row, col], corners));
+                return false;
+            }
+            self.blocker = self.hidden_by(row, col, &ray);
+            if self.blocker.is_some() {
+                return false;
+            }
         }
-        self.blocker = None;
         for [row, col] in self.ground.modules_along(self.vantage.place, ray.to) {
             let inside = u32::try_from(row).ok().zip(u32::try_from(col).ok());
             let Some((row, col)) = inside.filter(|&(row, col)| self.ground.block().contains(row, col)) else {
                 return false;
             };
-            if self.is_hidden_by(row, col, &ray) {
-                self.blocker = Some([row, col]);
+            self.blocker = self.hidden_by(row, col, &ray);
+            if self.blocker.is_some() {
                 return false;
             }
         }
@@ -236,7 +257,12 @@ impl Eye<'_> {
             Rises::of(&self.vantage, self.vantage.reach(rectangle), &tops)
         });
         let is_free = ray.free[0] <= rises.reach[0] && rises.reach[1] <= ray.free[1];
-        (!is_free).then(|| (module, rises, Line::in_module(rectangle[0], self.vantage.place, ray.to, self.curvature)))
+        (!is_free).then(|| (module, rises, self.line(index, ray)))
+    }
+
+    /// The line to a place over a load module.
+    fn line(&self, index: usize, ray: &Ray) -> Line {
+        Line::in_module(self.rectangle(index)[0], self.vantage.place, ray.to, self.curvature)
     }
 
     /// The same for its objects, where it is loaded and has some.
@@ -268,7 +294,8 @@ impl Eye<'_> {
 
     /// The logarithm of the share of light that the canopies of one load module take.
     fn lost_in_canopies(&mut self, row: u32, col: u32, ray: &Ray, length_m: f64) -> f64 {
-        let mut stretches = std::mem::take(&mut self.stretches);
+        let (mut parts, mut stretches) = (std::mem::take(&mut self.parts), std::mem::take(&mut self.stretches));
+        parts.clear();
         stretches.clear();
         let side = self.ground.frame().side;
         if let Some((module, rises, line)) = self.past_objects(row, col, ray) {
@@ -279,29 +306,36 @@ impl Eye<'_> {
                     continue;
                 }
                 let crowns = |row, col| slopes.may_rise(lookup, 0, ray.slope, [row, col]);
-                lookup.triangles_along_in(side, line.start, line.end, crowns, |corners| {
-                    below_top(module, side, &line, &corners, wanted, &mut stretches);
-                });
+                over_canopies(lookup, side, &line, line.end, crowns, &mut parts);
             }
+            in_canopies(module, side, &line, &mut parts, wanted, &mut stretches);
         }
         let lost = lost_in(&mut stretches, length_m);
-        self.stretches = stretches;
+        (self.parts, self.stretches) = (parts, stretches);
         lost
     }
 
-    /// Whether a load module that is loaded stands between the eye and a place.
-    fn is_hidden_by(&self, row: u32, col: u32, ray: &Ray) -> bool {
+    /// A load module that is loaded, if it stands between the eye and a place, and the triangle of its ground that does.
+    fn hidden_by(&self, row: u32, col: u32, ray: &Ray) -> Option<([u32; 2], Option<Corners>)> {
         let side = self.ground.frame().side;
-        let Some((module, rises, line)) = self.past(self.ground.block().index(row, col), ray) else { return false };
+        let (module, rises, line) = self.past(self.ground.block().index(row, col), ray)?;
         if let Some(decks) = module.decks()
             && rises.decks.highest.may_rise(0, ray.slope)
             && crossed_at(decks, side, &line).is_finite()
         {
-            return true;
+            return Some(([row, col], None));
         }
-        let lookup = module.lookup();
-        let wanted = |row, col| rises.ground.may_rise(lookup, 0, ray.slope, [row, col]);
-        rises.ground.highest.may_rise(0, ray.slope) && hidden_in(lookup, side, &line, wanted).is_finite()
+        if line.length_squared == 0.0 || !rises.ground.highest.may_rise(0, ray.slope) {
+            return None;
+        }
+        let (lookup, found) = (module.lookup(), Cell::new(None));
+        let wanted = |row, col| found.get().is_none() && rises.ground.may_rise(lookup, 0, ray.slope, [row, col]);
+        lookup.triangles_along_in(side, line.start, line.end, wanted, |corners| {
+            if found.get().is_none() && risen_at(&corners, &line).is_finite() {
+                found.set(Some(corners));
+            }
+        });
+        found.get().map(|corners| ([row, col], Some(corners)))
     }
 }
 

@@ -103,29 +103,29 @@ impl Horizon {
     }
 
     /// Lets something stand over a rectangle, nowhere higher than `top`.
-    pub(crate) fn add(&mut self, rectangle: [[f64; 2]; 2], top: f64) {
+    pub(crate) fn add(&mut self, rectangle: [[f64; 2]; 2], top: i32) {
+        if top == i32::MIN {
+            return;
+        }
         let [near, far] = self.vantage.reach(rectangle);
         let first = near.max(self.width);
         let rings = (first / self.width) as usize - 1..self.rings.min((far / self.width) as usize);
         if rings.is_empty() {
             return;
         }
-        let rise = self.vantage.slope([first, far.max(first)], top).rise;
-        let [low, high] = rectangle;
-        let [east, north] = [0, 1].map(|axis| (low[axis] + high[axis]) / 2.0 - self.vantage.place[axis]);
-        let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
-        // Left or right of the middle, which the eye sees straight ahead.
-        let aside = corners.map(|corner| {
-            let [x, y] = [0, 1].map(|axis| corner[axis] - self.vantage.place[axis]);
-            (east * y - north * x).atan2(east * x + north * y)
-        });
-        let ends = [aside.iter().copied().fold(0.0, f64::min), aside.iter().copied().fold(0.0, f64::max)];
-        let sectors = if near == 0.0 {
-            0..=SECTORS - 1
-        } else {
-            let [right, left] = [ends[0] - ROUNDING, ends[1] + ROUNDING].map(|end| turn(north.atan2(east) + end));
-            right as usize..=right as usize + (left.floor() - right.floor()).rem_euclid(SECTORS as f64) as usize
-        };
+        let rise = self.vantage.slope([first, far.max(first)], f64::from(top)).rise;
+        // All around where the eye stands in it.
+        let mut sectors = 0..=SECTORS - 1;
+        if 0.0 < near {
+            let [low, high] = rectangle;
+            let turns = [low, [high[0], low[1]], high, [low[0], high[1]]].map(|corner| self.turn(corner));
+            // Less than half a turn from one of them.
+            let off =
+                turns.map(|turn| (turn - turns[0] + 1.5 * SECTORS as f64) % SECTORS as f64 - SECTORS as f64 / 2.0);
+            let [right, left] = [off.iter().fold(0.0, |a, b| b.min(a)), off.iter().fold(0.0, |a, b| b.max(a))];
+            let right = turns[0] + right - ROUNDING + SECTORS as f64;
+            sectors = right as usize..=(turns[0] + left + ROUNDING + SECTORS as f64) as usize;
+        }
         for sector in sectors {
             let row = &mut self.rises[sector % SECTORS * self.rings..][..self.rings];
             row[rings.clone()].iter_mut().for_each(|highest| *highest = highest.max(rise));
@@ -147,20 +147,25 @@ impl Horizon {
     /// How far the line to a place stays above everything, from the end of the first ring.
     pub(crate) fn clear_to(&self, to: [f64; 3]) -> f64 {
         let slope = self.vantage.slope_to(to);
-        let [east, north] = [0, 1].map(|axis| to[axis] - self.vantage.place[axis]);
-        let sector = turn(north.atan2(east)) as usize;
+        let sector = self.turn([to[0], to[1]]) as usize % SECTORS;
         let sector = &self.rises[sector * self.rings..][..self.rings];
         let clear = sector.partition_point(|&rise| f64::from(rise) < slope);
         self.width * (clear + 1) as f64
     }
+
+    /// The direction of a place among the sectors, which grows with its angle: along the sides of a square, so that no
+    /// angle is computed.
+    fn turn(&self, place: [f64; 2]) -> f64 {
+        let [east, north] = [0, 1].map(|axis| place[axis] - self.vantage.place[axis]);
+        let share = north / (east.abs() + north.abs());
+        let quarters = match (0.0 <= east, 0.0 <= north) {
+            (true, true) => share,
+            (false, _) => 2.0 - share,
+            (true, false) => 4.0 + share,
+        };
+        quarters * SECTORS as f64 / 4.0
+    }
 }
 
-/// Radians by which a direction may be off.
-const ROUNDING: f64 = 1e-9;
-
-/// A direction in radians as a place among the sectors.
-fn turn(radians: f64) -> f64 {
-    let turn = (radians / std::f64::consts::TAU).rem_euclid(1.0) * SECTORS as f64;
-    // Rounding may come to a whole turn.
-    if turn < SECTORS as f64 { turn } else { 0.0 }
-}
+/// Sectors by which a direction may be off.
+const ROUNDING: f64 = 1e-6;

@@ -1,6 +1,6 @@
 //! Lines of sight past what stands on the ground: prisms hide, canopies take light away.
 
-use crate::lookup::{Corners, STEPS};
+use crate::lookup::{Lookup, STEPS};
 use crate::objects::ObjectKind;
 use crate::sight::{Curvature, Line, crossed_at, hidden_at, part_over};
 use crate::{LoadedGround, Prism, QUANTA_PER_METRE, Sight, TerrainModule};
@@ -269,34 +269,78 @@ pub(crate) fn holds(prism: &Prism, [x, y]: [f64; 2]) -> bool {
 
 /// Adds the stretches of a line inside the canopies of a load module, up to a share of the line and a little more.
 fn canopies_along(module: &TerrainModule, side: u16, line: &Line, last: f64, stretches: &mut Vec<Stretch>) {
+    let mut parts = Vec::new();
     for lookup in &module.objects().canopies {
-        lookup.triangles_along(side, line.start, line.place(last), |corners| {
-            below_top(module, side, line, &corners, |_, _, _| true, stretches);
-        });
+        over_canopies(lookup, side, line, line.place(last), |_, _| true, &mut parts);
     }
+    in_canopies(module, side, line, &mut parts, |_, _, _| true, stretches);
 }
 
-/// Adds the parts of a line over one triangle of a canopy that lie below its top, ground triangle by ground triangle,
-/// in cells of the ground that are wanted: by the canopy's height in quanta, row and column.
-pub(crate) fn below_top(
+/// A part of a line over one canopy of a load module: which one, and where along the line it begins and ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Part {
+    canopy: i32,
+    from: f64,
+    to: f64,
+}
+
+/// Adds the parts of a line, up to a place, over the triangles of canopies in those cells that are wanted, by row and
+/// column; some more than once.
+pub(crate) fn over_canopies(
+    lookup: &Lookup,
+    side: u16,
+    line: &Line,
+    end: [f64; 2],
+    wanted: impl Fn(u32, u32) -> bool,
+    parts: &mut Vec<Part>,
+) {
+    lookup.triangles_along_in(side, line.start, end, wanted, |corners| {
+        if let Some([from, to]) = part_over(&corners, line).map(|ends| ends.map(|end| end[0]))
+            && from < to
+        {
+            parts.push(Part { canopy: corners[0][2], from, to });
+        }
+    });
+}
+
+/// Adds the stretches in which those parts of a line lie below the tops of canopies, triangle of the ground by triangle,
+/// in cells of the ground that are wanted: by the canopy's height in quanta, row and column. Parts are joined where they
+/// meet.
+pub(crate) fn in_canopies(
     module: &TerrainModule,
     side: u16,
     line: &Line,
-    corners: &Corners,
+    parts: &mut Vec<Part>,
+    wanted: impl Fn(u16, u32, u32) -> bool,
+    stretches: &mut Vec<Stretch>,
+) {
+    parts.sort_by(|a, b| a.canopy.cmp(&b.canopy).then(a.from.total_cmp(&b.from)));
+    parts.dedup_by(|next, last| {
+        let is_met = next.canopy == last.canopy && next.from <= last.to;
+        if is_met {
+            last.to = last.to.max(next.to);
+        }
+        is_met
+    });
+    for part in parts {
+        below_top(module, side, line, part, &wanted, stretches);
+    }
+}
+
+fn below_top(
+    module: &TerrainModule,
+    side: u16,
+    line: &Line,
+    part: &Part,
     wanted: impl Fn(u16, u32, u32) -> bool,
     stretches: &mut Vec<Stretch>,
 ) {
     const DEPTH_M: f64 = 10.0;
-    let Some([first, last]) = part_over(corners, line).map(|ends| ends.map(|end| end[0])) else { return };
-    if last <= first {
-        return;
-    }
-    let number = corners[0][2];
-    let canopy = &module.module().objects.canopies[number as usize];
+    let canopy = &module.module().objects.canopies[part.canopy as usize];
     let per_metre = -(1.0 - f64::from(canopy.fullness) / 100.0).ln() / DEPTH_M;
     let by = Hider::of(canopy.kind);
     let wanted = |row, col| wanted(canopy.height, row, col);
-    module.lookup().triangles_along_in(side, line.place(first), line.place(last), wanted, |corners| {
+    module.lookup().triangles_along_in(side, line.place(part.from), line.place(part.to), wanted, |corners| {
         let Some([from, to]) = part_over(&corners, line) else { return };
         // How far the line is above the top; along so short a way the earth's curvature is nothing.
         let above = |[at, ground]: [f64; 2]| line.height(at) - ground - f64::from(canopy.height);
@@ -307,9 +351,9 @@ pub(crate) fn below_top(
         let crossing = || from[0] + (to[0] - from[0]) * (a / (a - b));
         let from_at = if a < 0.0 { from[0] } else { crossing() };
         let to_at = if b < 0.0 { to[0] } else { crossing() };
-        let (from, to) = (from_at.max(first), to_at.min(last));
+        let (from, to) = (from_at.max(part.from), to_at.min(part.to));
         if from < to {
-            stretches.push(Stretch { canopy: number, from, to, per_metre, by });
+            stretches.push(Stretch { canopy: part.canopy, from, to, per_metre, by });
         }
     });
 }

@@ -100,36 +100,39 @@ impl Curvature {
 
 /// Where along a line the triangles of the ground first rise above it; infinity when they do not.
 pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
-    hidden_in(lookup, side, line, |_, _| true)
+    let mut nearest = f64::INFINITY;
+    if 0.0 < line.length_squared {
+        lookup.triangles_along(side, line.start, line.end, |corners| nearest = nearest.min(risen_at(&corners, line)));
+    }
+    nearest
 }
 
-/// The same, looked for only in those cells of the load module, by row and column, that may rise above the line.
-pub(crate) fn hidden_in(lookup: &Lookup, side: u16, line: &Line, may_rise: impl Fn(u32, u32) -> bool) -> f64 {
+/// Where along a line one triangle first rises above it; infinity where it does not.
+pub(crate) fn risen_at(corners: &Corners, line: &Line) -> f64 {
     let mut nearest = f64::INFINITY;
-    if line.length_squared == 0.0 {
+    let seen = corners.map(|corner| line.seen(corner.map(f64::from)));
+    if seen.iter().all(|&(left, _)| 0.0 < left) || seen.iter().all(|&(left, _)| left < 0.0) {
         return nearest;
     }
     // Between two edges the ground is straight, so it is enough to look where an edge is crossed.
-    lookup.triangles_along_in(side, line.start, line.end, may_rise, |corners| {
-        for i in 0..3 {
-            let edge = [corners[i], corners[(i + 1) % 3]].map(|place| place.map(f64::from));
-            let [(left_a, ahead_a), (left_b, ahead_b)] = edge.map(|place| line.seen(place));
-            if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
-                continue;
-            }
-            let share = left_a / (left_a - left_b);
-            let at = (ahead_a + share * (ahead_b - ahead_a)) / line.length_squared;
-            let height = edge[0][2] + share * (edge[1][2] - edge[0][2]);
-            if (0.0..=1.0).contains(&at) && line.height(at) < height {
-                nearest = nearest.min(at);
-            }
+    for i in 0..3 {
+        let ((left_a, ahead_a), (left_b, ahead_b)) = (seen[i], seen[(i + 1) % 3]);
+        if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
+            continue;
         }
-        if let Some([at, above]) = line.highest_between(&corners)
-            && 0.0 < above
-        {
-            nearest = nearest.min(at - (above / line.sag).sqrt());
+        let [height_a, height_b] = [corners[i], corners[(i + 1) % 3]].map(|corner| f64::from(corner[2]));
+        let share = left_a / (left_a - left_b);
+        let at = (ahead_a + share * (ahead_b - ahead_a)) / line.length_squared;
+        let height = height_a + share * (height_b - height_a);
+        if (0.0..=1.0).contains(&at) && line.height(at) < height {
+            nearest = nearest.min(at);
         }
-    });
+    }
+    if let Some([at, above]) = line.highest_between(corners)
+        && 0.0 < above
+    {
+        nearest = nearest.min(at - (above / line.sag).sqrt());
+    }
     nearest
 }
 
@@ -187,6 +190,11 @@ fn above(line: f64, deck: f64) -> f64 {
 
 /// The part of a line over or under a triangle: how far along it begins and ends, and the triangle's height there.
 pub(crate) fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]> {
+    // Most triangles beside a line are not crossed; what lies on the line counts as right of it.
+    let is_left = corners.map(|corner| 0.0 < line.seen(corner.map(f64::from)).0);
+    if is_left[0] == is_left[1] && is_left[1] == is_left[2] {
+        return None;
+    }
     let mut ends = [[0.0; 2]; 2];
     let mut count = 0;
     for i in 0..3 {
@@ -194,7 +202,7 @@ pub(crate) fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]>
         let (a, b) = (corners[i].min(corners[(i + 1) % 3]), corners[i].max(corners[(i + 1) % 3]));
         let (a, b) = (a.map(f64::from), b.map(f64::from));
         let ((left_a, ahead_a), (left_b, ahead_b)) = (line.seen(a), line.seen(b));
-        // What lies on the line counts as right of it, so none or two of the edges are crossed.
+        // None or two of the edges are crossed.
         if (0.0 < left_a) == (0.0 < left_b) {
             continue;
         }
