@@ -80,7 +80,7 @@ pub fn units(stage: Stage, job: &Job, area: &GamingArea) -> Vec<Unit> {
 pub fn needs(unit: Unit, job: &Job, area: &GamingArea) -> Vec<Unit> {
     let all = |stage| units(stage, job, area);
     // Features are part of the ground of every later stage, so each of them waits where that has to be decided again.
-    let is_joint = job.objects.as_ref().is_some_and(|objects| objects.joint);
+    let is_joint = job.counts_objects();
     let settled = || all(Stage::Level).into_iter().chain(if is_joint { all(Stage::Outlines) } else { Vec::new() });
     let and_settled = |needs: Vec<Unit>| settled().chain(needs).collect();
     match (unit.stage, unit.tile) {

@@ -171,8 +171,7 @@ impl Run<'_> {
     /// Polygons of each load module that count in its limits beside those of the ground, row by row; empty where none
     /// do.
     pub fn joint_objects(&self) -> Vec<u32> {
-        let is_joint = self.job.objects.as_ref().is_some_and(|objects| objects.joint);
-        let outlines = self.outlines.as_ref().filter(|_| is_joint);
+        let outlines = self.outlines.as_ref().filter(|_| self.job.counts_objects());
         outlines.map_or_else(Vec::new, |(_, outlines)| outlines.counts(self.area.grid))
     }
 

@@ -72,7 +72,7 @@ impl<'a> Session<'a> {
             return Err(not_ready(unit, need));
         }
         let Unit { stage, tile } = unit;
-        let is_joint = self.run.job.objects.as_ref().is_some_and(|objects| objects.joint);
+        let is_joint = self.run.job.counts_objects();
         let before_ground = matches!(stage, Stage::Profile | Stage::Level);
         if !before_ground && (stage != Stage::Outlines || is_joint) {
             self.take_features(unit)?;

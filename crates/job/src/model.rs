@@ -259,10 +259,14 @@ pub enum Count {
 }
 
 impl Job {
+    /// Whether objects count in the limits of the ground.
+    pub fn counts_objects(&self) -> bool {
+        self.objects.as_ref().is_some_and(|objects| objects.joint)
+    }
+
     /// The words for what limits count.
     pub fn counted_words(&self) -> &'static str {
-        let is_joint = self.objects.as_ref().is_some_and(|objects| objects.joint);
-        match (self.limits.count, is_joint) {
+        match (self.limits.count, self.counts_objects()) {
             (Count::Triangles, false) => "triangles",
             (Count::Polygons, false) => "polygons",
             (Count::Triangles, true) => "triangles and objects",
@@ -277,8 +281,7 @@ impl Job {
             Count::Triangles => counts.triangles,
             Count::Polygons => counts.polygons,
         };
-        let is_joint = self.objects.as_ref().is_some_and(|objects| objects.joint);
-        ground + if is_joint { module.objects.polygons() as u32 } else { 0 }
+        ground + if self.counts_objects() { module.objects.polygons() as u32 } else { 0 }
     }
 }
 
