@@ -21,6 +21,15 @@ pub struct Carries {
     pub levels: &'static str,
     /// Where a corner lies across and along its way.
     pub lanes: &'static str,
+    /// Bytes of all files for each triangle of a mesh, within a quarter; 0 where they do not follow from triangles.
+    pub triangle_bytes: f64,
+}
+
+impl Carries {
+    /// Whether all of it has one texture, in or beside one file.
+    pub(crate) fn is_one_file(&self) -> bool {
+        matches!(self.format, "obj" | "glb")
+    }
 }
 
 /// What a format says of what it has no room for.
@@ -39,6 +48,7 @@ const MESH: Carries = Carries {
     holes: LEFT_OUT,
     levels: ONE,
     lanes: LEFT_OUT,
+    triangle_bytes: 0.0,
 };
 const RASTER: Carries =
     Carries { classes: LEFT_OUT, decks: GROUND_ALONE, ribbons: GROUND_ALONE, objects: GROUND_ALONE, ..MESH };
@@ -47,6 +57,7 @@ const TILES: Carries = Carries {
     textures: "a picture in each tile, coarser farther away",
     levels: "tiles between a square and its load modules",
     lanes: LAST_UVS,
+    triangle_bytes: 32.0,
     ..MESH
 };
 const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where they are";
@@ -69,6 +80,7 @@ pub const CARRIES: [Carries; 17] = [
         decks: "faces behind those of the ground",
         ribbons: "faces behind those of decks",
         objects: "the last faces",
+        triangle_bytes: 23.0,
         ..MESH
     },
     Carries {
@@ -76,6 +88,7 @@ pub const CARRIES: [Carries; 17] = [
         classes: "materials in NAME.mtl",
         objects: "an object each",
         textures: "a picture beside it",
+        triangle_bytes: 49.0,
         ..MESH
     },
     Carries {
@@ -84,6 +97,7 @@ pub const CARRIES: [Carries; 17] = [
         textures: "a picture inside",
         levels: "nodes of MSFT_lod in place of those of load modules",
         lanes: LAST_UVS,
+        triangle_bytes: 38.0,
         ..MESH
     },
     Carries { format: "geotiff", holes: "NaN in the raster", ..RASTER },
@@ -113,6 +127,7 @@ pub const CARRIES: [Carries; 17] = [
         textures: "a picture for each square",
         levels: "level-of-detail nodes of each square, by distance",
         lanes: "UV lists of layer 1",
+        triangle_bytes: 163.0,
         ..MESH
     },
     Carries { format: "3dtiles", ..TILES },
@@ -133,6 +148,7 @@ pub const CARRIES: [Carries; 17] = [
         textures: "a picture for each tile",
         levels: "variants of each tile, called lod",
         lanes: "primvars:lane",
+        triangle_bytes: 104.0,
         ..MESH
     },
     Carries {
@@ -148,6 +164,7 @@ pub const CARRIES: [Carries; 17] = [
         ribbons: "meshes that are seen and not hit",
         objects: "meshes that are seen, and boxes that are hit",
         textures: "a picture for each block",
+        triangle_bytes: 48.0,
         ..MESH
     },
 ];

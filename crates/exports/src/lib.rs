@@ -23,6 +23,8 @@ pub use textures::{Texture, TextureFile, Textures};
 mod carries;
 pub use carries::{CARRIES, Carries, LEFT_OUT, carries_table, carries_text};
 mod detail;
+mod forecast;
+pub use forecast::Forecast;
 mod lanes;
 mod mesh;
 mod objects;

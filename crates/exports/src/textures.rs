@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::ExportError;
 use source_files::{Crs, Imagery, Keep, SourceError, Square};
 
-/// Bytes of decoded strips and tiles that are kept.
-const KEPT_BYTES_MAX: usize = 256 << 20;
+/// Bytes of decoded strips and tiles that are kept: a row of tiles of 512 pixels across 60,000 of them.
+const KEPT_BYTES_MAX: usize = 128 << 20;
 /// Sides of what a picture draws at once are multiples of this.
 const SIDE_STEP: usize = 16;
 /// How many times the wanted texel one is that is told of.
@@ -173,7 +173,7 @@ impl Textures {
     }
 
     /// The finest texel that a texture of so many metres may have: load modules have a whole number of them.
-    fn texel_m(&self, module_m: f64, longest_m: f64, texel_m: f64) -> f64 {
+    pub(crate) fn texel_m(&self, module_m: f64, longest_m: f64, texel_m: f64) -> f64 {
         let least = texel_m.max(self.texel_m).max(longest_m / (self.side_max - 1) as f64);
         // Rounded down, a module has fewer texels, each of them longer.
         if least <= module_m { module_m / (module_m / least + 1e-9).floor() } else { least }

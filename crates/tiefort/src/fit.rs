@@ -38,7 +38,7 @@ pub fn check(forecast: &Forecast, workers: usize, folder: &Path) -> Result<(), F
 }
 
 /// Bytes free on the disk on which `folder` is, or will be.
-fn free_disk(folder: &Path) -> Option<u64> {
+pub fn free_disk(folder: &Path) -> Option<u64> {
     let whole = std::path::absolute(folder).ok()?;
     let there = whole.ancestors().find(|folder| folder.exists())?;
     fs4::available_space(there).ok()

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
 use clap::Args;
-use exports::{Block, CARRIES, Datum, ExportError, Facts, LEFT_OUT, Levels, Mesh, Product, Textures, WebMap, Work};
+use exports::{
+    Block, CARRIES, Datum, ExportError, Facts, Forecast, LEFT_OUT, Levels, Mesh, Product, Textures, WebMap, Work,
+};
 use job::Job;
 use store::Folder;
 use terrain::{MaterialName, ModuleId, PostRect};
@@ -281,6 +283,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     let is_folder = arguments.format.extensions().is_empty();
     let folder = is_folder.then(|| NewFolder::begin(&arguments.out)).transpose()?;
     let product = prepared(arguments, arguments.database(), work)?;
+    tell_size(arguments, &product)?;
     match arguments.format {
         Format::Ply | Format::Obj | Format::Glb => write_mesh(arguments, &product)?,
         Format::Geotiff => write_raster(arguments, &product, work)?,
@@ -311,6 +314,21 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
         folder.finish()?;
     }
     Ok(summary(arguments.format, &product, said))
+}
+
+/// Tells about how much will be written, and where that has no room.
+fn tell_size(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
+    let forecast = if arguments.quiet { None } else { Forecast::of(product, arguments.format.carries())? };
+    let Some(Forecast { triangles, bytes, texture_bytes }) = forecast else { return Ok(()) };
+    let textures = match texture_bytes {
+        0 => String::new(),
+        bytes => format!(", {} of it textures", files::bytes_text(bytes)),
+    };
+    let room = crate::fit::free_disk(&arguments.out).filter(|&free| free < bytes);
+    let room = room.map(|free| format!("; {} are free there", files::bytes_text(free))).unwrap_or_default();
+    let triangles = grouped(triangles);
+    terminal::tell(&format!("about {} of {triangles} triangles{textures}{room}", files::bytes_text(bytes)));
+    Ok(())
 }
 
 /// What of a database is exported, as it is to be seen.

@@ -1,0 +1,96 @@
+//! About how large an export becomes, before it is written.
+
+use terrain::ModuleRect;
+
+use crate::objects::{Facet, things_in};
+use crate::ribbons::Ribbons;
+use crate::{Carries, ExportError, LEFT_OUT, Product};
+
+/// Load modules whose ribbons and objects are counted: the others have as many on average.
+const COUNTED: usize = 32;
+
+/// About what an export of meshes takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// Triangles of all sheets and levels.
+    pub triangles: u64,
+    /// Bytes of all files.
+    pub bytes: u64,
+    /// Bytes of these that are textures.
+    pub texture_bytes: u64,
+}
+
+impl Forecast {
+    /// That of a product in a format; `None` where the format is no mesh, and its size follows from other things.
+    ///
+    /// # Errors
+    /// When an orthophoto has changed, or part of it cannot be decoded.
+    pub fn of(product: &Product, format: &Carries) -> Result<Option<Self>, ExportError> {
+        if format.triangle_bytes == 0.0 {
+            return Ok(None);
+        }
+        let ground = product.modules.iter().chain(product.coarser.iter().flatten());
+        let ground: usize = ground.map(|module| module.counts().triangles as usize).sum();
+        let levels = 1.0 + product.coarser.len() as f64;
+        let triangles = ground as f64 + levels * above_ground(product);
+        let texture_bytes = match format.textures {
+            LEFT_OUT => 0.0,
+            _ => texture_bytes(product, format)?,
+        };
+        let bytes = triangles * format.triangle_bytes + texture_bytes;
+        Ok(Some(Self { triangles: triangles as u64, bytes: bytes as u64, texture_bytes: texture_bytes as u64 }))
+    }
+}
+
+/// Triangles of ribbons and objects of one level.
+fn above_ground(product: &Product) -> f64 {
+    let ribbons = Ribbons::of(product).filter(|_| product.has_ribbons);
+    let step = product.rect.count().div_ceil(COUNTED).max(1);
+    let triangles = |facets: &[Facet]| -> usize {
+        facets.iter().flat_map(|facet| &facet.polygons).map(|polygon| polygon.len().saturating_sub(2)).sum()
+    };
+    let (mut counted, mut found) = (0, 0);
+    for id in product.rect.iter().step_by(step) {
+        counted += 1;
+        found += ribbons.as_ref().map_or(0, |ribbons| triangles(&ribbons.in_module(product, id)));
+        found += things_in(product, id).iter().map(|(_, facets)| triangles(facets)).sum::<usize>();
+    }
+    found as f64 * product.rect.count() as f64 / f64::from(counted.max(1))
+}
+
+/// Bytes of textures, as many for each load module as for that in the middle.
+fn texture_bytes(product: &Product, format: &Carries) -> Result<f64, ExportError> {
+    let rect = product.rect;
+    let (row, col) = (rect.south.midpoint(rect.north), rect.west.midpoint(rect.east));
+    let middle = ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
+    let (Some(texture), Some(textures)) = (product.texture(middle, 0.0)?, &product.textures) else { return Ok(0.0) };
+    let side_m = product.side_m();
+    // One texture for all has fewer texels.
+    let of = |modules: u32| textures.texel_m(side_m, f64::from(modules) * side_m, 0.0);
+    let modules_together = if format.is_one_file() { rect.rows().max(rect.cols()) } else { 1 };
+    let finer = of(1) / of(modules_together);
+    Ok(texture.bytes.len() as f64 * rect.count() as f64 * finer * finer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::{with_bridge, with_levels, with_objects};
+    use crate::{CARRIES, Mesh};
+
+    #[test]
+    fn triangles_are_those_of_the_mesh_and_of_its_levels() {
+        let mut bent = with_objects();
+        bent.has_ribbons = false;
+        for product in [with_objects(), bent, with_bridge(), with_levels()] {
+            let levels: usize = product.levels().map(|level| Mesh::of(&level).triangles.len()).sum();
+            for format in CARRIES.iter().filter(|format| format.triangle_bytes != 0.0) {
+                let found = Forecast::of(&product, format).unwrap().unwrap();
+                let bytes = (levels as f64 * format.triangle_bytes) as u64;
+                assert_eq!(found, Forecast { triangles: levels as u64, bytes, texture_bytes: 0 });
+            }
+        }
+        let raster = CARRIES.iter().find(|format| format.format == "geotiff").unwrap();
+        assert_eq!(Forecast::of(&with_objects(), raster).unwrap(), None);
+    }
+}
