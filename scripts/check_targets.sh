@@ -38,10 +38,26 @@ export CARGO_TARGET_DIR=$home CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=none C
 CARGO_ZIGBUILD_ZIG_PATH=$(echo "$tools"/lib/python3*/site-packages/ziglang/zig)
 export CARGO_ZIGBUILD_ZIG_PATH CARGO_ZIGBUILD_CACHE_DIR=$home/zig
 export ZIG_GLOBAL_CACHE_DIR=$home/zig ZIG_LOCAL_CACHE_DIR=$home/zig
-# Debian's standard library asks GCC's protection of stacks to be linked, which Zig has inside: two archives of nothing.
-mkdir -p "$home/empty"
+
+# What Windows wants beside them: two archives of nothing, since Debian's standard library asks for GCC's protection of
+# stacks, which Zig has inside; the one name that the Python module exports, without which Zig exports all of them, more
+# than a library can have; and for wine, where Debian's is older than it, the library that random numbers come from.
+windows=$home/windows
+mkdir -p "$windows" "$home/empty"
 for name in libssp.a libssp_nonshared.a; do printf '!<arch>\n' >"$home/empty/$name"; done
 export CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUSTFLAGS="-L native=$home/empty"
+c_for_windows() {
+    "$CARGO_ZIGBUILD_ZIG_PATH" cc -target x86_64-windows-gnu -x c - "$@"
+}
+for_windows() {
+    c_for_windows -c -o "$windows/exports.o" <<<'
+__attribute__((section(".drectve"), used)) static const char names[] = " -export:PyInit__tiefort";'
+    c_for_windows -shared -o "$windows/bcryptprimitives.dll" -ladvapi32 <<<'
+unsigned char SystemFunction036(void *to, unsigned long count);
+__declspec(dllexport) int ProcessPrng(unsigned char *to, unsigned long long count) {
+    return SystemFunction036(to, (unsigned long)count);
+}'
+}
 
 # One command of cargo for a target.
 zig() {
@@ -53,6 +69,10 @@ for target; do
     zig zigbuild "$target" -p load-module-reader-c -p tiefort
     # Python's own names are found when it loads the module; macOS has to be told.
     [[ $target != *apple* ]] || link=(-C link-arg=-undefined -C link-arg=dynamic_lookup)
+    if [[ $target == *windows* ]]; then
+        for_windows
+        link=(-C "link-arg=$windows/exports.o")
+    fi
     zig rustc "$target" -p tiefort-python -- "${link[@]}"
     printf '%s: compiled and linked in %d s\n' "$target" $((SECONDS - start))
 done
@@ -67,6 +87,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 export WINEPREFIX=$home/wine WINEDEBUG=-all
 start=$SECONDS
+cp "$home/windows/bcryptprimitives.dll" "${program%/*}"
 "$TIEFORT" build tests/jobs/small.toml --out "$scratch/here.tdb" --quiet
 "$wine" "$program" build tests/jobs/small.toml --out "$scratch/windows.tdb" --quiet
 "$wine" "$program" verify "$scratch/windows.tdb"
