@@ -66,6 +66,8 @@ zig() {
 [[ $# -gt 0 ]] || set -- x86_64-pc-windows-gnu aarch64-apple-darwin
 for target; do
     start=$SECONDS link=()
+    # There is nothing to strip, and the program that strips for macOS is not among the packages.
+    [[ $target != *apple* ]] || export CARGO_PROFILE_DEV_STRIP=none
     zig zigbuild "$target" -p load-module-reader-c -p tiefort
     # Python's own names are found when it loads the module; macOS has to be told.
     [[ $target != *apple* ]] || link=(-C link-arg=-undefined -C link-arg=dynamic_lookup)
