@@ -40,10 +40,52 @@ pub(crate) struct Choice<'a> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Chosen {
     pub ways: Vec<Result<Way, Why>>,
-    /// Triangles of each load module by the estimate, without what was taken before.
+    /// Triangles of each load module by the estimate, while all were lines of the coarsest tolerance.
+    pub lines: Vec<i64>,
+    /// The same of what was chosen in the end.
     pub estimate: Vec<i64>,
     /// Whether any limit was in the way of anything.
     pub is_bound: bool,
+}
+
+/// Triangles of each load module that forming took beyond the estimate.
+#[derive(Clone, Debug)]
+pub(crate) struct Amiss {
+    /// The part that lines pay for, before any became finer or wider: what wide roads take of a load module beyond the
+    /// estimate is no reason to leave other ways out.
+    pub of_lines: Vec<i64>,
+    /// All of it.
+    pub of_all: Vec<i64>,
+}
+
+impl Amiss {
+    /// Nothing yet, in so many load modules.
+    pub fn none(modules: usize) -> Self {
+        Self { of_lines: vec![0; modules], of_all: vec![0; modules] }
+    }
+
+    /// What was `taken` beyond the estimate of what was chosen: lines pay by their part of the estimate.
+    pub fn of(chosen: &Chosen, taken: &[i64]) -> Self {
+        let of_all = less(taken, &chosen.estimate);
+        let estimates = chosen.lines.iter().zip(&chosen.estimate);
+        let of_lines = of_all.iter().zip(estimates).map(|(all, (lines, estimate))| match estimate {
+            1.. => all * lines / estimate,
+            _ => *all,
+        });
+        Self { of_lines: of_lines.collect(), of_all }
+    }
+
+    /// The greater of both, in each load module.
+    pub fn or_more(self, other: &Self) -> Self {
+        let most =
+            |one: Vec<i64>, other: &[i64]| one.into_iter().zip(other).map(|(one, other)| one.max(*other)).collect();
+        Self { of_lines: most(self.of_lines, &other.of_lines), of_all: most(self.of_all, &other.of_all) }
+    }
+}
+
+/// Differences, load module by load module.
+pub(crate) fn less(all: &[i64], some: &[i64]) -> Vec<i64> {
+    all.iter().zip(some).map(|(all, some)| all - some).collect()
 }
 
 /// One part in so many may be left out where nearly everything is in the ground.

@@ -7,7 +7,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use crate::choice::{Choice, Chosen, Why};
+use crate::choice::{Amiss, Choice, Chosen, Why, less};
 use crate::shares::{Ledger, Tier};
 use crate::stretches::Stretch;
 use crate::strokes::Stroke;
@@ -19,22 +19,23 @@ use crate::thin::Tolerance;
 const POND_POSTS: i128 = 12;
 
 impl Choice<'_> {
-    /// Chooses where `before` triangles are taken of each load module already. Main kinds become wider within the share
-    /// of `wider`.
-    pub fn choose(&self, before: &[i64], wider: Tier) -> Chosen {
-        let mut tally = Tally::new(self.outlays, Ledger::new(self.shares, before));
+    /// Chooses where forming took `amiss` of each load module beyond the last estimate. Main kinds become wider within
+    /// the share of `wider`.
+    pub fn choose(&self, amiss: &Amiss, wider: Tier) -> Chosen {
+        let mut tally = Tally::new(self.outlays, Ledger::new(self.shares, &amiss.of_lines));
         let mut why: Vec<Option<Why>> = vec![None; self.stretches.all.len()];
         self.offer(&mut tally, &mut why);
         if take_back(self, &mut tally, &mut why) {
             self.offer(&mut tally, &mut why);
             take_back(self, &mut tally, &mut why);
         }
+        let lines = less(tally.ledger.modules(), &amiss.of_lines);
+        tally.ledger.add_to_each(&less(&amiss.of_all, &amiss.of_lines));
         let held = self.refine(&mut tally, wider);
         self.beyond(&mut tally, &mut why);
         let is_bound = held || why.iter().flatten().any(|why| *why != Why::Beyond);
         let ways = tally.granted.iter().zip(&why).map(|(way, why)| way.ok_or(why.unwrap_or(Why::Beyond))).collect();
-        let estimate = tally.ledger.modules().iter().zip(before).map(|(all, before)| all - before).collect();
-        Chosen { ways, estimate, is_bound }
+        Chosen { ways, lines, estimate: less(tally.ledger.modules(), &amiss.of_all), is_bound }
     }
 
     /// Grants every stretch that is not there yet, and was not taken back, what there is room for.

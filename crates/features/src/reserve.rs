@@ -6,7 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::choice::{Choice, Chosen, Why, ids};
+use crate::choice::{Amiss, Choice, Chosen, Why, ids};
 use crate::clean::Notes;
 use crate::cost::{Cost, cost};
 use crate::forms::{Formed, form};
@@ -86,18 +86,18 @@ pub fn reserve(
     let strokes = strokes(&stretches, graded, strands, site);
     let outlays = Outlays::of(&stretches, &strokes, graded, strands, (shares, site));
     let choice = Choice { stretches: &stretches, strokes: &strokes, outlays: &outlays, shares, graded, site };
-    let mut before = vec![0; shares.modules.len()];
+    let mut amiss = Amiss::none(shares.modules.len());
     // One full load module on its way makes a line of all of a motorway, so that main kinds may use all of their share
     // for their width, unless other ways lose their place by it.
     let mut wider = Tier::Wide;
-    let mut chosen = choice.choose(&before, wider);
+    let mut chosen = choice.choose(&amiss, wider);
     let mut taking_back = TakingBack::new(&choice);
     let mut round = 0;
     loop {
         if wider == Tier::Wide && !choice.has_nearly_all(&chosen) {
             (wider, round) = (Tier::Others, 0);
-            before.fill(0);
-            chosen = choice.choose(&before, wider);
+            amiss = Amiss::none(shares.modules.len());
+            chosen = choice.choose(&amiss, wider);
             taking_back = TakingBack::new(&choice);
         }
         let grants = grants(&choice, &chosen, strands.len());
@@ -109,10 +109,10 @@ pub fn reserve(
             return Reserved::of(&choice, &chosen, strands, formed, cost, grants);
         }
         if round < ROUNDS {
-            let errors = taken.iter().zip(&chosen.estimate).map(|(taken, estimate)| taken - estimate);
+            let found = Amiss::of(&chosen, &taken);
             // The second time nothing is offered that the first has refused.
-            before = before.iter().zip(errors).map(|(old, new)| if round == 0 { new } else { new.max(*old) }).collect();
-            chosen = choice.choose(&before, wider);
+            amiss = if round == 0 { found } else { found.or_more(&amiss) };
+            chosen = choice.choose(&amiss, wider);
         } else {
             taking_back.take_back(&mut chosen, &taken, &formed, strands);
         }

@@ -119,9 +119,14 @@ impl<'a> Ledger<'a> {
         let [rows, cols] = shares.origins();
         let windows = vec![0; (rows * cols) as usize];
         let mut ledger = Self { shares, modules: vec![0; shares.modules.len()], windows, area: 0 };
-        let changes = (0..).zip(before.iter().copied()).filter(|(_, by)| *by != 0).collect::<Vec<_>>();
-        ledger.add(&changes);
+        ledger.add_to_each(before);
         ledger
+    }
+
+    /// Adds to all load modules.
+    pub fn add_to_each(&mut self, by: &[i64]) {
+        let changes = (0..).zip(by.iter().copied()).filter(|(_, by)| *by != 0).collect::<Vec<_>>();
+        self.add(&changes);
     }
 
     /// Adds to load modules, each named once.

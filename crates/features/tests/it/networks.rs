@@ -297,3 +297,31 @@ fn odd_networks_keep_every_limit() {
         levelled(&ways, &Shares::each(SIZE, most));
     }
 }
+
+#[test]
+fn what_an_interchange_takes_of_a_load_module_for_its_width_leaves_no_street_out() {
+    // Five motorways cross in one load module, where their sides meet more often than their middle lines.
+    let motorway = |number: i64| {
+        let (from, by) = (20.0 + 90.0 * number as f64, 4.0 * number as f64);
+        way(number, "highway=motorway", &[(from, 20.0), (225.0 + by, 220.0 + by), (250.0, 380.0 - by)])
+    };
+    let street = |number, tags: &str, from, to| way(number, &format!("highway=residential {tags}"), &[from, to]);
+    let elsewhere = |number: i64| {
+        let north = 1.5 * number as f64 - 13.0;
+        street(number, "", (5.0, north), (395.0, north))
+    };
+    let mut ways: Vec<Source> = (0..5).map(motorway).chain((10..20).map(elsewhere)).collect();
+    ways.extend([
+        street(30, "name=through", (120.0, 203.0), (190.0, 203.0)),
+        street(31, "name=through", (190.0, 203.0), (260.0, 203.0)),
+        street(32, "name=through", (260.0, 203.0), (330.0, 203.0)),
+        street(33, "", (190.0, 203.0), (190.0, 130.0)),
+        street(34, "", (260.0, 203.0), (260.0, 130.0)),
+    ]);
+    for others in (68..=92).step_by(4) {
+        let mut shares = Shares::each(SIZE, 400);
+        shares.modules.fill(Share { main: others * 8 / 5, others });
+        let left_out = levelled(&ways, &shares).reserved.left_out;
+        assert!(left_out.is_empty(), "{left_out:?} where others have {others}");
+    }
+}
