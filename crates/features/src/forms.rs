@@ -14,10 +14,10 @@ use crate::exact::Segment;
 use crate::middles::{Middle, middles};
 use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
-use crate::room::{AtNodes, remark_rooms, share_out};
+use crate::room::{Sharing, remark_rooms};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
-use crate::strips::{Face, Room, Wide, wide_segments};
+use crate::strips::{Face, Room, Wide};
 use crate::thin::{Station, Tolerance, thin};
 use crate::toes::toes;
 use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy, Site};
@@ -87,16 +87,16 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     let stays = |place: Place| shared.contains(&place);
     let pieces = pieces(network, heights, site, &stays, grants);
     remark_narrow(network, &pieces, &mut remarks);
-    let mut wide = wide_segments(&pieces);
+    let mut sharing = Sharing::of(network, &pieces, heights);
     let thinned = |(number, strand): (usize, &Strand)| thinned(strand, grants.of_strand(number), site, &stays);
     let mut thinned: Vec<Strand> = strands.iter().enumerate().filter_map(thinned).collect();
-    let (mut formed, culverts) = round_together(graded, &pieces, &mut wide, &thinned, site);
+    let (mut formed, culverts) = round_together(graded, &pieces, &mut sharing, &thinned, site);
     if enter_culverts(&mut thinned, culverts) {
-        formed = round_together(graded, &pieces, &mut wide, &thinned, site).0;
+        formed = round_together(graded, &pieces, &mut sharing, &thinned, site).0;
     }
     // Each round takes the room of a strip or lowers a lake, so that there is a last one.
     loop {
-        let (tilted, uneven) = (tilted(&formed, network, &wide), uneven(&formed));
+        let (tilted, uneven) = (tilted(&formed, network, &sharing), uneven(&formed));
         if tilted.is_empty() && uneven.is_empty() {
             break;
         }
@@ -105,11 +105,11 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
             let mut notes = Notes { id: lake.id, lattice: site.lattice, remarks: &mut remarks };
             notes.write_at(place, Flaw::LevelsDisagree, Remedy::Levelled);
         }
-        tilted.into_iter().for_each(|number| wide[number as usize].room = Room::None);
-        formed = round_together(graded, &pieces, &mut wide, &thinned, site).0;
+        tilted.into_iter().for_each(|number| sharing.narrow(number, Room::None));
+        formed = round_together(graded, &pieces, &mut sharing, &thinned, site).0;
     }
-    formed.middles = middles(graded, (&pieces, &wide), (strands, &thinned), &formed.points, site);
-    remark_rooms(network, &pieces, &wide, &mut remarks);
+    formed.middles = middles(graded, (&pieces, &sharing.wide), (strands, &thinned), &formed.points, site);
+    remark_rooms(network, &pieces, &sharing.wide, &mut remarks);
     formed.remarks.append(&mut remarks);
     Remark::sort(&mut formed.remarks);
     formed
@@ -119,12 +119,13 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
 fn round_together(
     graded: &Graded,
     pieces: &[Piece],
-    wide: &mut [Wide],
+    sharing: &mut Sharing,
     thinned: &[Strand],
     site: &Site,
 ) -> (Formed, Vec<Culvert>) {
     let Graded { network, heights, .. } = *graded;
-    let all = share_out(network, pieces, wide, heights);
+    let all = sharing.share_out();
+    let wide = &sharing.wide;
     let toes = toes(graded, pieces, wide, &all);
     let (decks, faces): (Vec<Face>, Vec<Face>) = all.into_iter().partition(|face| face.is_deck);
     let mut lines = outlines(&faces);
@@ -182,7 +183,7 @@ fn lower(strands: &mut [Strand], lake: &Uneven) {
 
 /// Strips that another line would tilt, or that would make one too steep: those of which a corner has the height of a
 /// line that passes through it, and those at the side of which a line begins that is steeper than it may be.
-fn tilted(formed: &Formed, network: &Network, wide: &[Wide]) -> BTreeSet<u32> {
+fn tilted(formed: &Formed, network: &Network, sharing: &Sharing) -> BTreeSet<u32> {
     let grades: HashMap<FeatureId, u32> =
         network.ways.iter().map(|way| (way.id, way.traits.grade_most_ppm())).collect();
     let mut steep: HashSet<Place> = HashSet::new();
@@ -199,8 +200,7 @@ fn tilted(formed: &Formed, network: &Network, wide: &[Wide]) -> BTreeSet<u32> {
     };
     let is_beside_steep = |face: &Face| steep.iter().any(|place| is_on_outline(face, *place));
     let strips = formed.faces.iter().filter(|face| face.corners.iter().any(has_other_height) || is_beside_steep(face));
-    let at_nodes = AtNodes::of(wide);
-    strips.flat_map(|face| at_nodes.wide_of(face, wide)).collect()
+    strips.flat_map(|face| sharing.at_nodes.wide_of(face, &sharing.wide)).collect()
 }
 
 /// Whether a place lies within a step of the outline of a face.
@@ -294,7 +294,7 @@ fn centrelines(network: &Network, pieces: &[Piece], wide: &[Wide], heights: &[i3
 }
 
 /// Whose height a place has: the least of rank, class, role and height.
-type Decided = BTreeMap<Place, (Role, u16, Role, i32)>;
+type Decided = HashMap<Place, (Role, u16, Role, i32)>;
 
 /// What an edge belongs to: class, role and feature, and whether its line runs from the greater end to the lesser.
 type OfEdge = (u16, Role, FeatureId, bool);
@@ -309,7 +309,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
     }
     snap_round(&mut rounded, &hot, &in_turn);
     let own: Vec<Vec<i32>> = lines.iter().zip(&rounded).map(|(line, places)| heights_along(line, places)).collect();
-    let mut heights: Decided = BTreeMap::new();
+    let mut heights: Decided = HashMap::with_capacity(rounded.iter().map(Vec::len).sum());
     for ((line, places), own) in lines.iter().zip(&rounded).zip(&own) {
         for (&place, &height) in places.iter().zip(own) {
             let mine = (line.role.max(Role::Centre), line.class, line.role, height);
@@ -317,7 +317,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
         }
     }
     let inside = Inside::new(faces, &lines, &rounded);
-    let mut edges: BTreeMap<(Place, Place), OfEdge> = BTreeMap::new();
+    let mut edges: Vec<((Place, Place), OfEdge)> = Vec::new();
     let mut culverts = Vec::new();
     for (number, (line, places)) in lines.iter().zip(&rounded).enumerate() {
         let mut cut = 0;
@@ -328,7 +328,7 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
             } else if !passes(at) && !passes(at + 1) {
                 let key = (ends[0].min(ends[1]), ends[0].max(ends[1]));
                 let mine = (line.class, line.role, line.id, ends[1] < ends[0]);
-                edges.entry(key).and_modify(|edge| *edge = mine.min(*edge)).or_insert(mine);
+                edges.push((key, mine));
             } else if passes(at) != passes(at + 1) {
                 let ends = if passes(at) { [at, at + 1] } else { [at + 1, at] };
                 culverts.extend(culvert(line, ends.map(|at| (places[at], own[number][at])), site));
@@ -368,9 +368,13 @@ fn surfaces(lines: &[Strand], rounded: &[Vec<Place>], heights: &Decided) -> Vec<
     surfaces
 }
 
-/// Numbers the points that edges use.
-fn collect(heights: &Decided, edges: BTreeMap<(Place, Place), OfEdge>) -> Formed {
-    let used: BTreeSet<Place> = edges.keys().flat_map(|(a, b)| [*a, *b]).collect();
+/// Numbers the points that edges use; of several edges between two points the least is kept.
+fn collect(heights: &Decided, mut edges: Vec<((Place, Place), OfEdge)>) -> Formed {
+    edges.sort_unstable();
+    edges.dedup_by_key(|(ends, _)| *ends);
+    let mut used: Vec<Place> = edges.iter().flat_map(|((a, b), _)| [*a, *b]).collect();
+    used.sort_unstable();
+    used.dedup();
     let points: Vec<(Place, i32)> = used.iter().map(|place| (*place, heights[place].3)).collect();
     let number = |place: Place| points.partition_point(|(other, _)| *other < place) as u32;
     let edges = edges

@@ -15,8 +15,8 @@ const BESIDE: i32 = 100 * 128;
 /// Rounds in which decks are raised: those of several storeys raise one another.
 const CLEAR_ROUNDS: usize = 4;
 
-/// Steps of the cells in which edges are looked up.
-const CELL: i32 = 1 << 12;
+/// Steps of the cells in which edges are looked up: about as long as an edge.
+const CELL: i32 = 1 << 7;
 
 /// A deck's edge over something: the passage, the edge, and what lies below, an edge or a piece of water counted on
 /// from the edges.
@@ -94,7 +94,7 @@ fn overs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Over> {
         let mut near = BTreeSet::new();
         cells_of(belows.segment(below), belows.half(below), |cell| near.extend(cells.get(&cell).into_iter().flatten()));
         for &(passage, edge) in &near {
-            if belows.layer(edge) <= belows.layer(below) || belows.meets(edge, below) {
+            if belows.layer(edge) <= belows.layer(below) || belows.meets(edge, below) || belows.are_apart(edge, below) {
                 continue;
             }
             let passes = network.segment(edge).crossing(&belows.segment(below)).is_some();
@@ -243,6 +243,15 @@ impl Belows<'_> {
         between([a, b], levels, place)
     }
 
+    /// Whether the boxes of a deck's edge and of what lies below, with their widths, are apart: then they have nothing in
+    /// common.
+    fn are_apart(&self, edge: u32, below: u32) -> bool {
+        let reach = (self.half(edge) + self.half(below)).ceil() as i32 + 2;
+        let (one, other) = (self.segment(edge), self.segment(below));
+        let are = |a: i32, b: i32, c: i32, d: i32| a.max(b) + reach < c.min(d) || c.max(d) + reach < a.min(b);
+        are(one.a.col, one.b.col, other.a.col, other.b.col) || are(one.a.row, one.b.row, other.a.row, other.b.row)
+    }
+
     /// The area that a deck's edge and what lies below have in common: none where that is less than a triangle. Of a
     /// line it is where the line runs inside.
     fn common(&self, edge: u32, below: u32) -> Vec<Corner> {
@@ -327,6 +336,37 @@ mod tests {
         assert_eq!(lacks(&network, &heights, &found, &[], Clearances::USUAL), []);
         let raised = Clearances { rail: Clearances::USUAL.rail + 16, ..Clearances::USUAL };
         assert_eq!(lacks(&network, &heights, &found, &[], raised).len(), 1, "no higher than it has to be");
+    }
+
+    #[test]
+    fn looking_near_by_finds_all_that_decks_lie_over() {
+        let street = |at: i64| {
+            let north = 10.0 + 7.0 * at as f64;
+            way(at, "highway=residential", &[(10.0, north), (95.0, north + 2.0)])
+        };
+        let bridge = |at: i64| {
+            let from = 15.0 + 6.0 * at as f64;
+            way(100 + at, "highway=motorway bridge=yes", &[(from, 8.0), (3.0 * from - 90.0, 80.0)])
+        };
+        let sources = (0..10).map(street).chain((0..10).map(bridge)).collect();
+        let (network, ..) = network(sources, |_, _| 10.0);
+        let (decks, belows) = (passages(&network), Belows { network: &network, water: &[] });
+        let mut all = Vec::new();
+        for (passage, deck) in (0..).zip(&decks).filter(|(_, deck)| deck.is_deck) {
+            let aside = beside(&network, deck);
+            for (&edge, below) in deck.edges.iter().flat_map(|edge| (0..belows.count()).map(move |below| (edge, below)))
+            {
+                let is_below = belows.layer(below) < belows.layer(edge) && !belows.meets(edge, below);
+                let passes = network.segment(edge).crossing(&network.segment(below)).is_some();
+                if is_below && (passes || !aside.contains(&below)) && 3 <= belows.common(edge, below).len() {
+                    all.push((passage, edge, below));
+                }
+            }
+        }
+        all.sort_unstable();
+        let found = overs(&network, &decks, &[]);
+        assert!(20 < found.len(), "{}", found.len());
+        assert_eq!(found.iter().map(|over| (over.passage, over.edge, over.below)).collect::<Vec<_>>(), all);
     }
 
     #[test]

@@ -192,12 +192,6 @@ impl<'a> SegmentPairs<'a> {
     }
 }
 
-/// Calls `found` with every pair of segments whose boxes touch, the lesser number first, and with some more pairs.
-pub fn segment_pairs(segments: &[Segment], found: &mut impl FnMut(u32, u32)) {
-    let pairs = SegmentPairs::of(segments);
-    (0..pairs.rows()).for_each(|row| pairs.in_row(row, &|_| true, found));
-}
-
 fn pairs_in(
     square: Square,
     segments: &[Segment],
@@ -306,7 +300,8 @@ mod tests {
         #[test]
         fn every_crossing_pair_is_found(segments in segments(200)) {
             let mut found = BTreeSet::new();
-            segment_pairs(&segments, &mut |one, other| { found.insert((one, other)); });
+            let pairs = SegmentPairs::of(&segments);
+            (0..pairs.rows()).for_each(|row| pairs.in_row(row, &|_| true, &mut |one, other| { found.insert((one, other)); }));
             for one in 0..segments.len() {
                 for other in one + 1..segments.len() {
                     if segments[one].crossing(&segments[other]).is_some() {

@@ -5,28 +5,65 @@ use std::collections::BTreeSet;
 use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::pieces::Piece;
-use crate::quarters::segment_pairs;
-use crate::strips::{Face, Room, Wide, faces};
+use crate::quarters::SegmentPairs;
+use crate::strips::{Arm, Face, Room, Wide, arms, faces, wide_segments};
 use crate::{Flaw, Network, Place, Remark, Remedy};
 
 /// Rounds of narrowing: each takes a strip that overlaps from whole to half or from half to none.
 const ROUNDS: usize = 4;
 
-/// The faces of all strips after overlaps are resolved, and what is left of each strip.
-pub(crate) fn share_out(network: &Network, pieces: &[Piece], wide: &mut [Wide], heights: &[i32]) -> Vec<Face> {
-    let mut found = faces(network, pieces, wide, heights);
-    for _ in 0..ROUNDS {
-        let losers = losers(network, pieces, wide, &found);
-        if losers.is_empty() {
-            break;
-        }
-        for &loser in &losers {
-            let of = &mut wide[loser as usize];
-            of.room = if of.room == Room::Whole { Room::Half } else { Room::None };
-        }
-        found = faces(network, pieces, wide, heights);
+/// Strips of a network while they share out the room where they overlap.
+pub(crate) struct Sharing<'a> {
+    network: &'a Network,
+    pieces: &'a [Piece],
+    heights: &'a [i32],
+    /// All strip segments.
+    pub wide: Vec<Wide>,
+    /// Those that end at each node.
+    pub at_nodes: AtNodes,
+    arms: Vec<Arm>,
+    /// Of each node whether a segment that ends there has less room than when overlaps were last looked for: what has
+    /// no such node lies as it did.
+    is_new: Vec<bool>,
+}
+
+impl<'a> Sharing<'a> {
+    /// All strips with the room they ask for.
+    pub fn of(network: &'a Network, pieces: &'a [Piece], heights: &'a [i32]) -> Self {
+        let wide = wide_segments(pieces);
+        let (at_nodes, arms) = (AtNodes::of(&wide), arms(network, pieces, &wide));
+        Self { network, pieces, heights, wide, at_nodes, arms, is_new: vec![true; network.nodes.len()] }
     }
-    found
+
+    /// Leaves a strip segment less room.
+    pub fn narrow(&mut self, number: u32, room: Room) {
+        let of = &mut self.wide[number as usize];
+        of.room = room;
+        [of.a, of.b].into_iter().for_each(|node| self.is_new[node as usize] = true);
+    }
+
+    /// The faces of all strips in the room that they have.
+    pub fn faces(&self) -> Vec<Face> {
+        faces(self.network, self.pieces, (&self.wide, &self.arms), self.heights)
+    }
+
+    /// The faces of all strips after overlaps are resolved.
+    pub fn share_out(&mut self) -> Vec<Face> {
+        let mut found = self.faces();
+        for _ in 0..ROUNDS {
+            let losers = self.losers(&found);
+            self.is_new.fill(false);
+            if losers.is_empty() {
+                break;
+            }
+            for loser in losers {
+                let had = self.wide[loser as usize].room;
+                self.narrow(loser, if had == Room::Whole { Room::Half } else { Room::None });
+            }
+            found = self.faces();
+        }
+        found
+    }
 }
 
 /// Writes down which strips others left less room than they ask for.
@@ -51,43 +88,53 @@ struct Part<'a> {
     face: Option<u32>,
 }
 
-fn losers(network: &Network, pieces: &[Piece], wide: &[Wide], found: &[Face]) -> BTreeSet<u32> {
-    let (mut segments, mut owners, mut parts): (Vec<Segment>, Vec<u32>, Vec<Part>) = Default::default();
-    for (number, face) in found.iter().enumerate().filter(|(_, face)| !face.is_deck) {
-        let places = face.places();
-        let least = places.iter().min().copied().unwrap_or(Place::new(0, 0));
-        for at in 0..places.len() {
-            segments.push(Segment { a: places[at], b: places[(at + 1) % places.len()] });
-            owners.push(parts.len() as u32);
-        }
-        parts.push(Part { rank: (face.class, least), nodes: &face.nodes, face: Some(number as u32) });
-    }
-    let is_wide: BTreeSet<(u32, u32)> =
-        wide.iter().filter(|of| of.room != Room::None).map(|of| (of.piece, of.segment)).collect();
-    for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| !piece.is_deck()) {
-        for (segment, nodes) in piece.nodes.windows(2).enumerate() {
-            if !is_wide.contains(&(number as u32, segment as u32)) {
-                let [a, b] = [nodes[0], nodes[1]].map(|node| network.nodes[node as usize].place);
-                segments.push(Segment { a, b });
+impl Sharing<'_> {
+    /// The strip segments that lose room to others, by pairs of which one is new: of all other pairs the loser has lost
+    /// it, and is new by that.
+    fn losers(&self, faces: &[Face]) -> BTreeSet<u32> {
+        let Self { network, pieces, wide, .. } = self;
+        let (mut segments, mut owners, mut parts): (Vec<Segment>, Vec<u32>, Vec<Part>) = Default::default();
+        for (number, face) in faces.iter().enumerate().filter(|(_, face)| !face.is_deck) {
+            let places = face.places();
+            let least = places.iter().min().copied().unwrap_or(Place::new(0, 0));
+            for at in 0..places.len() {
+                segments.push(Segment { a: places[at], b: places[(at + 1) % places.len()] });
                 owners.push(parts.len() as u32);
-                parts.push(Part { rank: (piece.traits.class, a.min(b)), nodes, face: None });
+            }
+            parts.push(Part { rank: (face.class, least), nodes: &face.nodes, face: Some(number as u32) });
+        }
+        let is_wide: BTreeSet<(u32, u32)> =
+            wide.iter().filter(|of| of.room != Room::None).map(|of| (of.piece, of.segment)).collect();
+        for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| !piece.is_deck()) {
+            for (segment, nodes) in piece.nodes.windows(2).enumerate() {
+                if !is_wide.contains(&(number as u32, segment as u32)) {
+                    let [a, b] = [nodes[0], nodes[1]].map(|node| network.nodes[node as usize].place);
+                    segments.push(Segment { a, b });
+                    owners.push(parts.len() as u32);
+                    parts.push(Part { rank: (piece.traits.class, a.min(b)), nodes, face: None });
+                }
             }
         }
+        let mut losers = BTreeSet::new();
+        let of_new: Vec<bool> =
+            parts.iter().map(|part| part.nodes.iter().any(|node| self.is_new[*node as usize])).collect();
+        let is_new = |segment: u32| of_new[owners[segment as usize] as usize];
+        let mut found = |one: u32, other: u32| {
+            let (s, t) = (&segments[one as usize], &segments[other as usize]);
+            let (p, q) = (&parts[owners[one as usize] as usize], &parts[owners[other as usize] as usize]);
+            if p.nodes.iter().any(|node| q.nodes.contains(node)) || s.crossing(t).is_none() {
+                return;
+            }
+            let (winner, loser) = if p.rank < q.rank { (p, q) } else { (q, p) };
+            // A line of lower class is cut where it lies in a strip; that costs no other feature room.
+            if let (Some(face), true) = (loser.face, winner.face.is_some() || winner.rank.0 < loser.rank.0) {
+                losers.extend(self.at_nodes.wide_of(&faces[face as usize], wide));
+            }
+        };
+        let pairs = SegmentPairs::of(&segments);
+        (0..pairs.rows()).for_each(|row| pairs.in_row(row, &is_new, &mut found));
+        losers
     }
-    let (mut losers, at_nodes) = (BTreeSet::new(), AtNodes::of(wide));
-    segment_pairs(&segments, &mut |one, other| {
-        let (s, t) = (&segments[one as usize], &segments[other as usize]);
-        let (p, q) = (&parts[owners[one as usize] as usize], &parts[owners[other as usize] as usize]);
-        if p.nodes.iter().any(|node| q.nodes.contains(node)) || s.crossing(t).is_none() {
-            return;
-        }
-        let (winner, loser) = if p.rank < q.rank { (p, q) } else { (q, p) };
-        // A line of lower class is cut where it lies in a strip; that costs no other feature room.
-        if let (Some(face), true) = (loser.face, winner.face.is_some() || winner.rank.0 < loser.rank.0) {
-            losers.extend(at_nodes.wide_of(&found[face as usize], wide));
-        }
-    });
-    losers
 }
 
 /// The strip segments that end at each node, in the order of nodes.
@@ -122,6 +169,9 @@ impl AtNodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Grants;
+    use crate::pieces::pieces;
+    use crate::samples::{network, site, way};
 
     #[test]
     fn strips_that_meet_in_a_junction_are_found_by_their_nodes() {
@@ -149,5 +199,41 @@ mod tests {
             assert_eq!(at_nodes.wide_of(&face(nodes.clone(), None), &wide), all, "{nodes:?}");
         }
         assert_eq!(at_nodes.wide_of(&face(vec![0], Some(4)), &wide), [4]);
+    }
+
+    #[test]
+    fn what_is_looked_at_again_is_all_that_can_have_changed() {
+        // Roads side by side and across, which overlap in every round.
+        let tags = ["highway=motorway", "highway=primary", "highway=primary width=40"];
+        let road = |at: i64| {
+            let (tags, from, by) = (tags[at as usize % 3], 10.0 + 1.3 * at as f64, 0.6 * (at * at % 7) as f64);
+            let line = if at % 4 == 0 { [(from, 8.0), (from + by, 90.0)] } else { [(8.0, from), (90.0, from + by)] };
+            way(at, tags, &line)
+        };
+        let (network, ground, _) = network((0..40).map(road).collect(), |_, _| 10.0);
+        let heights: Vec<i32> = ground.into_iter().map(|height| height.unwrap_or(0)).collect();
+        let pieces = pieces(&network, &heights, &site(), &|_| false, &Grants::default());
+        let mut sharing = Sharing::of(&network, &pieces, &heights);
+        let mut reference = Sharing::of(&network, &pieces, &heights);
+        for round in 0..3 {
+            let found = sharing.share_out();
+            let mut expected = reference.faces();
+            for _ in 0..ROUNDS {
+                reference.is_new.fill(true);
+                for loser in reference.losers(&expected) {
+                    let had = reference.wide[loser as usize].room;
+                    reference.narrow(loser, if had == Room::Whole { Room::Half } else { Room::None });
+                }
+                expected = reference.faces();
+            }
+            assert_eq!(found, expected, "in round {round}");
+            // As where a strip is tilted.
+            for number in (round..sharing.wide.len() as u32).step_by(9) {
+                sharing.narrow(number, Room::None);
+                reference.narrow(number, Room::None);
+            }
+        }
+        let rooms: BTreeSet<Room> = sharing.wide.iter().map(|of| of.room).collect();
+        assert_eq!(rooms.len(), 3);
     }
 }

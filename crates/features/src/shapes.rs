@@ -4,9 +4,9 @@
 use crate::choice::{Choice, Chosen, Why};
 use crate::forms::{Formed, Surface};
 use crate::pieces::pieces;
+use crate::room::Sharing;
 use crate::strand::{Role, Strand};
 use crate::stretches::Part;
-use crate::strips::{faces, wide_segments};
 use crate::{Form, Grant, Grants};
 
 /// Puts the ground of what is left out into what is formed.
@@ -35,8 +35,7 @@ pub(crate) fn shape(choice: &Choice, chosen: &Chosen, strands: &[Strand], formed
     }
     let grants = Grants { edges, strands: Vec::new() };
     let pieces = pieces(network, choice.graded.heights, choice.site, &|_| false, &grants);
-    let wide = wide_segments(&pieces);
-    let strips = faces(network, &pieces, &wide, choice.graded.heights);
+    let strips = Sharing::of(network, &pieces, choice.graded.heights).faces();
     for face in strips.into_iter().filter(|face| !face.is_deck && 3 <= face.corners.len()) {
         if face.corners.len() == 4 && face.wide.is_some() {
             let [right_a, right_b, left_b, left_a] = [0, 1, 2, 3].map(|corner| face.corners[corner]);

@@ -77,11 +77,12 @@ pub(crate) fn wide_segments(pieces: &[Piece]) -> Vec<Wide> {
 
 /// An arm of a station: a strip segment as seen from there.
 #[derive(Clone, Copy)]
-struct Arm {
+pub(crate) struct Arm {
     node: u32,
     wide: u32,
     /// Whether the station is the segment's last.
     last: bool,
+    /// Steps to either side where it has all of its room.
     half: f64,
     length: f64,
     /// Unit vector away from the station.
@@ -89,14 +90,15 @@ struct Arm {
     to: [i64; 2],
 }
 
-/// The faces of all strips: one for each segment that has room, one for each junction of three and more.
-pub(crate) fn faces(network: &Network, pieces: &[Piece], wide: &[Wide], heights: &[i32]) -> Vec<Face> {
-    let mut arms = arms(network, pieces, wide);
-    arms.sort_by(|a, b| a.node.cmp(&b.node).then_with(|| by_angle(a.to, b.to)).then(a.wide.cmp(&b.wide)));
+/// The faces of all strips: one for each segment that has room, one for each junction of three and more. `all` are the
+/// [`arms`] of `wide`.
+pub(crate) fn faces(network: &Network, pieces: &[Piece], (wide, all): (&[Wide], &[Arm]), heights: &[i32]) -> Vec<Face> {
     let mut corners: Vec<[[Place; 2]; 2]> = vec![[[Place::new(0, 0); 2]; 2]; wide.len()];
-    let mut junctions = Vec::new();
-    for at_node in arms.chunk_by(|a, b| a.node == b.node) {
-        let node = at_node[0].node;
+    let (mut junctions, mut at_node) = (Vec::new(), Vec::new());
+    for all_at_node in all.chunk_by(|a, b| a.node == b.node) {
+        at_node.clear();
+        at_node.extend(all_at_node.iter().filter_map(|arm| arm.within(wide[arm.wide as usize].room)));
+        let Some(&Arm { node, .. }) = at_node.first() else { continue };
         let place = network.nodes[node as usize].place;
         let count = at_node.len();
         // The corner counter-clockwise of each arm.
@@ -148,21 +150,34 @@ fn face(network: &Network, pieces: &[Piece], of: &Wide, mut corners: Vec<(Place,
     Face { class, id, corners, is_deck: piece.is_deck(), nodes, wide: None, centreline: None }
 }
 
-fn arms(network: &Network, pieces: &[Piece], wide: &[Wide]) -> Vec<Arm> {
+/// The arms of all strip segments, whatever room they have: by station, and counter-clockwise.
+pub(crate) fn arms(network: &Network, pieces: &[Piece], wide: &[Wide]) -> Vec<Arm> {
     let mut arms = Vec::with_capacity(2 * wide.len());
-    for (number, of) in wide.iter().enumerate().filter(|(_, of)| of.room != Room::None) {
+    for (number, of) in (0..).zip(wide) {
         let width = pieces[of.piece as usize].traits.width;
-        let steps = f64::from(width) / f64::from(network.lattice.quanta_per_step());
-        let steps = if of.room == Room::Half { (steps / 2.0).max(f64::from(STRIP_STEPS_MIN)) } else { steps };
+        let half = f64::from(width) / f64::from(network.lattice.quanta_per_step()) / 2.0;
         for (node, other, last) in [(of.a, of.b, false), (of.b, of.a, true)] {
             let to = network.nodes[node as usize].place.to(network.nodes[other as usize].place);
             let [east, north] = to.map(|steps| steps as f64);
             let length = (east * east + north * north).sqrt();
             let unit = [east / length, north / length];
-            arms.push(Arm { node, wide: number as u32, last, half: steps / 2.0, length, unit, to });
+            arms.push(Arm { node, wide: number, last, half, length, unit, to });
         }
     }
+    arms.sort_by(|a, b| a.node.cmp(&b.node).then_with(|| by_angle(a.to, b.to)).then(a.wide.cmp(&b.wide)));
     arms
+}
+
+impl Arm {
+    /// It with the room that is left to its segment; none where that is none.
+    fn within(&self, room: Room) -> Option<Self> {
+        let half = match room {
+            Room::Whole => self.half,
+            Room::Half => (self.half / 2.0).max(f64::from(STRIP_STEPS_MIN) / 2.0),
+            Room::None => return None,
+        };
+        Some(Self { half, ..*self })
+    }
 }
 
 /// Counter-clockwise from the east, exactly.
