@@ -15,6 +15,7 @@ import sys
 BENCHES = {
     "peers": "peers", "speed": "speed", "fidelity": "fidelity", "limit": "limit", "borders": "limit",
     "methods": "paper", "paper": "paper", "features": "features", "scale": "features", "crowd": "features",
+    "growth": "growth",
     "size": "program", "reader": "program", "serve": "program", "python": "package", "selftest": "selftest",
 }
 
