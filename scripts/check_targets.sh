@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Compiles and links the program, the reader for C and the Python module for Windows and macOS. Debian has Rust's
-# standard library for them as source only, which is compiled, too; Zig is their C compiler and linker. Nothing is
-# installed: all lies in target/targets, 4 GB, and is used again. Where Debian's packages are not to be had, it says so
-# and ends well.
+# Compiles the program, the reader for C and the Python module for Windows and macOS, and links them for Windows. Debian
+# has Rust's standard library for both as source only, which is compiled, too; Zig is their C compiler and linker.
+# Nothing is installed: all lies in target/targets, 4 GB, and is used again. Where Debian's packages are not to be had,
+# it says so and ends well.
 #
 #     scripts/check_targets.sh                                   both
 #     scripts/check_targets.sh x86_64-pc-windows-gnu             one
@@ -65,17 +65,16 @@ zig() {
 }
 [[ $# -gt 0 ]] || set -- x86_64-pc-windows-gnu aarch64-apple-darwin
 for target; do
-    start=$SECONDS link=()
-    # There is nothing to strip, and the program that strips for macOS is not among the packages.
-    [[ $target != *apple* ]] || export CARGO_PROFILE_DEV_STRIP=none
-    zig zigbuild "$target" -p load-module-reader-c -p tiefort
-    # Python's own names are found when it loads the module; macOS has to be told.
-    [[ $target != *apple* ]] || link=(-C link-arg=-undefined -C link-arg=dynamic_lookup)
-    if [[ $target == *windows* ]]; then
-        for_windows
-        link=(-C "link-arg=$windows/exports.o")
+    start=$SECONDS
+    if [[ $target == *apple* ]]; then
+        # Apple's frameworks, which the program is linked with, are Apple's to hand out.
+        zig check "$target" -p load-module-reader-c -p tiefort -p tiefort-python
+        printf '%s: compiled in %d s\n' "$target" $((SECONDS - start))
+        continue
     fi
-    zig rustc "$target" -p tiefort-python -- "${link[@]}"
+    zig zigbuild "$target" -p load-module-reader-c -p tiefort
+    for_windows
+    zig rustc "$target" -p tiefort-python -- -C "link-arg=$windows/exports.o"
     printf '%s: compiled and linked in %d s\n' "$target" $((SECONDS - start))
 done
 
