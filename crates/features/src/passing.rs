@@ -243,7 +243,7 @@ impl Belows<'_> {
         between([a, b], levels, place)
     }
 
-    /// Whether the boxes of a deck's edge and of what lies below, with their widths, are apart: then they have nothing in
+    /// Whether the boxes of a deck's edge and of what lies below are apart, with their widths: they have nothing in
     /// common.
     fn are_apart(&self, edge: u32, below: u32) -> bool {
         let reach = (self.half(edge) + self.half(below)).ceil() as i32 + 2;

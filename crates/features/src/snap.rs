@@ -34,7 +34,10 @@ pub fn snap_round(lines: &mut [Vec<Place>], hot: &[Place], each: Each) -> Vec<Me
     let (segments, owners) = segments_of(lines);
     let mut meetings = crossings(&segments, &owners, &|_| true, each);
     let crossed = meetings.iter().map(|meeting| meeting.place);
-    let pixels = each_once(lines.iter().flatten().copied().chain(crossed).chain(hot.iter().copied()));
+    let mut pixels: Vec<Place> = lines.iter().flatten().copied().chain(crossed).chain(hot.iter().copied()).collect();
+    // Most vertices belong to several lines, and here every segment is asked for what it runs through.
+    pixels.sort_unstable();
+    pixels.dedup();
     let mut bent = bend(lines, &segments, &owners, hits(&segments, &pixels, each));
     while !bent.is_empty() {
         lines.iter_mut().for_each(Vec::dedup);
@@ -45,7 +48,7 @@ pub fn snap_round(lines: &mut [Vec<Place>], hot: &[Place], each: Each) -> Vec<Me
         meetings.extend(crossings);
         let (new, numbers): (Vec<Segment>, Vec<u32>) =
             segments.iter().zip(0..).filter(|(_, number)| is_new[*number as usize]).unzip();
-        let pixels = each_once(lines.iter().flatten().copied());
+        let pixels: Vec<Place> = lines.iter().flatten().copied().collect();
         let of_new = hits(&new, &pixels, each).into_iter().map(|(number, pixel)| (numbers[number as usize], pixel));
         let all = hits(&segments, &crossed, each).into_iter().chain(of_new).collect();
         bent = bend(lines, &segments, &owners, all);
@@ -53,14 +56,6 @@ pub fn snap_round(lines: &mut [Vec<Place>], hot: &[Place], each: Each) -> Vec<Me
     meetings.sort_unstable();
     meetings.dedup();
     meetings
-}
-
-/// Places in order, each once: most vertices belong to several lines.
-fn each_once(places: impl Iterator<Item = Place>) -> Vec<Place> {
-    let mut places: Vec<Place> = places.collect();
-    places.sort_unstable();
-    places.dedup();
-    places
 }
 
 /// The segment that begins at a vertex of a line.
