@@ -10,7 +10,7 @@ use crate::QUANTA_PER_METRE;
 /// Quanta by which a thing must stay below a line to be left out: far more than rounding.
 const MARGIN: f64 = 2.0;
 
-/// An eye in quanta, and how many quanta the earth falls away at a quantum's distance; it falls with the square of that.
+/// An eye in quanta, and how many quanta the earth falls away at a quantum's distance; it falls with that squared.
 #[derive(Clone, Copy)]
 pub(crate) struct Vantage {
     pub place: [f64; 3],
@@ -72,8 +72,8 @@ const RINGS: f64 = 256.0;
 /// Quanta across a ring, at least.
 const WIDTH_MIN: f64 = 25.0 * QUANTA_PER_METRE as f64;
 
-/// How far lines of sight from an eye stay above everything, whatever their slope: not before the first ring ends, since
-/// all directions meet there.
+/// How far lines of sight from an eye stay above everything, by their slope: told from the end of the first ring, since
+/// all directions meet inside.
 #[derive(Clone)]
 pub(crate) struct Horizon {
     vantage: Vantage,
