@@ -172,7 +172,7 @@ pub(crate) fn level(
     Key::new("level")
         .part(RULES, |part| {
             let part = part.list(job.class_names().iter(), |part, name| part.text(name));
-            let part = part.real(*share_main).real(*share_max);
+            let part = part.number(LEVEL_REVISION).real(*share_main).real(*share_max);
             let quanta = [road, rail, water, bank, cut_max, fill_max, clip];
             let part = quanta.into_iter().fold(part, |part, quanta| part.signed(quanta.into()));
             let part = part.maybe(smooth_milliposts, |part, thousandths| part.number(thousandths.into()));
@@ -199,6 +199,9 @@ pub(crate) fn level(
         })
 }
 
+/// Rises whenever the same features may come to something else, or are written otherwise; jobs without them are as before.
+const LEVEL_REVISION: u64 = 1;
+
 fn feed_features(builder: FingerprintBuilder, features: &Features) -> FingerprintBuilder {
     let Features { steps_per_post, vertices, edges, spans } = features;
     let builder = builder.signed((*steps_per_post).into()).list(vertices.iter(), feed_vertex);
@@ -211,7 +214,7 @@ fn feed_features(builder: FingerprintBuilder, features: &Features) -> Fingerprin
 
 /// Classes of the ground inside features, and decks above it; their edges are in the TIN.
 fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> FingerprintBuilder {
-    let TileFeatures { tile: _, kept: _, surfaces, shaped, slopes: _, decks, lines: _ } = features;
+    let TileFeatures { tile: _, kept: _, surfaces, shaped, slopes: _, watersides: _, decks, lines: _ } = features;
     let feed = |builder: FingerprintBuilder, surface: &FeatureSurface| {
         let FeatureSurface { class, ground, body, ring } = surface;
         let ground = match ground {

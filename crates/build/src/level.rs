@@ -71,7 +71,7 @@ impl Artifact for Levelling<'_> {
         let Self { run, read, spec, sounded } = *self;
         let shares = shares(&run.area.budget, spec);
         let levelled = read.features.level(sounded, (spec.options, spec.falls), &shares);
-        let pieces = pieces(run, &read.features, &levelled.reserved.formed);
+        let pieces = pieces(run, &read.features, &levelled);
         let mut level = area_level(run, read, &levelled);
         level.reserved = reserved(run, &levelled.reserved.formed, &pieces);
         for piece in &pieces {

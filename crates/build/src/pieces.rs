@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use crate::ground::{GamingArea, slope_reach};
+use crate::ground::{GamingArea, slope_reach, waterside_reach};
 use features::{
     Cost, Earthworks, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Middle, Place, Remark, Reserved, Role,
     Surface, Traits, Why,
@@ -13,7 +13,7 @@ use store::{
 };
 use terrain::{
     FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, LineTraits, ModuleGrid, ModuleId, PostRect, Side,
-    SideSpan, SurfaceGround, TileFeatures, TileId, Vertex, WayLine,
+    SideSpan, SurfaceGround, TileFeatures, TileId, Vertex, Waterside, WayLine,
 };
 use tin::load_modules::{Layout, cut_decks};
 use tin::tiling::{outer_border_posts, outer_sides};
@@ -25,7 +25,8 @@ use crate::run::Run;
 use crate::strips::{is_one_of, strips, whole_strips};
 
 /// What features put into each tile, row-major.
-pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Formed) -> Vec<TileFeatures> {
+pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, levelled: &Levelled) -> Vec<TileFeatures> {
+    let formed = &levelled.reserved.formed;
     let steps = features.site.lattice.steps_per_post();
     let mut cutting = Cutting { area: &run.area, steps, classes: classes_of(run.job), pieces: Vec::new() };
     cutting.pieces = run.area.tiles.iter().map(|&tile| Piece::of(tile, steps)).collect();
@@ -35,6 +36,7 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, formed: &Form
     cutting.surfaces(&formed.shaped, false, &BTreeSet::new());
     cutting.decks(&formed.decks);
     cutting.slopes(formed);
+    cutting.watersides(&levelled.watersides);
     cutting.lines(&formed.middles, &features.traits_by_id());
     let Cutting { area, pieces, .. } = cutting;
     pieces
@@ -87,6 +89,7 @@ impl Piece {
         features.decks.sort();
         features.decks = (0..).zip(features.decks).flat_map(|(body, deck)| with_body(vec![deck], body)).collect();
         features.slopes.sort_unstable();
+        features.watersides.sort_unstable();
         features.lines.sort();
         features.kept.spans = spans(&features.surfaces, rect, features.kept.steps_per_post);
         features.kept = features.kept.canonical();
@@ -240,6 +243,17 @@ impl Cutting<'_> {
         for ends in held.chain(formed.shaped_slopes.iter().copied()) {
             for index in self.touching(ends.into_iter().map(|(place, _)| place), reach) {
                 self.pieces[index].features.slopes.push(ends.map(vertex));
+            }
+        }
+    }
+
+    /// Pieces of water, for all tiles into which the slopes beside them may reach.
+    fn watersides(&mut self, watersides: &[Waterside]) {
+        let reach = (waterside_reach(self.area.frame.spacing) + 1) * self.steps;
+        for waterside in watersides {
+            let places = waterside.ends.map(|end| Place::new(end.at.row, end.at.col));
+            for index in self.touching(places.into_iter(), reach) {
+                self.pieces[index].features.watersides.push(*waterside);
             }
         }
     }

@@ -3,13 +3,14 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use terrain::{Each, QUANTA_PER_METRE};
+use terrain::{Each, QUANTA_PER_METRE, Waterside};
 
 use crate::aground::{Beside, still_under, tell_of_hills, uncut, under_hills};
 use crate::earthworks::{Laid, earthworks};
 use crate::objects::{Plan, strips};
 use crate::pieces::moved;
 use crate::rules::Sorted;
+use crate::watersides::{Watersides, watersides};
 use crate::{
     About, Bed, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Kind, Lake, Network,
     Outline, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters, Way, afloat, banks,
@@ -61,6 +62,8 @@ pub struct Levelled {
     pub remarks: Vec<Remark>,
     /// What they move.
     pub earthworks: Earthworks,
+    /// Water that lies off the natural ground, in the TIN or not.
+    pub watersides: Vec<Waterside>,
     /// Quanta of bridges that would run through hills, and became tunnels.
     pub through_hills: i64,
 }
@@ -213,7 +216,14 @@ impl AreaFeatures {
         let mut remarks = self.remarks.clone();
         let Watered { mut strands, lakes, level } =
             self.waters(Soundings { at: &at, near: &near, middle: &middle, inside }, falls, &mut remarks);
+        let watersides = watersides(&strands, &at);
         strands.extend(self.breaklines(&near));
+        // Roads rest on the ground that water leaves.
+        let drawn = Watersides::of(&watersides, self.site.lattice.metres_per_step());
+        let natural = at;
+        let beside_water = |place: Place, height: i32| drawn.ground(place.into(), height);
+        let at = |place: Place| natural(place).map(|height| beside_water(place, height));
+        let middle = |place: Place| middle(place).map(|height| beside_water(place, height));
         let resting = ground_of(&self.roads, &at, &near);
         let mut hills = under_hills(&self.roads, &resting, options.cut_max);
         let roads = &*self.roads.with_tunnels(&hills);
@@ -244,7 +254,7 @@ impl AreaFeatures {
         Remark::sort(&mut remarks);
         let width = |id: FeatureId| kinds.get(&id).map_or(0, |traits| traits.width);
         let earthworks = earthworks(&Laid {
-            ground: &at,
+            ground: &natural,
             site: &self.site,
             roads: Graded { grants: &reserved.grants, ..graded },
             pins: &pins,
@@ -257,7 +267,7 @@ impl AreaFeatures {
             inside,
             limits: (options, falls),
         });
-        Levelled { reserved, remarks, earthworks, through_hills }
+        Levelled { reserved, remarks, earthworks, watersides, through_hills }
     }
 
     /// Rivers, lakes and what else polygons of water became, by the ground inside the area and that nearest to places

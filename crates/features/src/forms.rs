@@ -69,7 +69,7 @@ pub struct Formed {
     pub surfaces: Vec<Surface>,
     /// Ground that a class of its own covers without being in the TIN: what there was no room for.
     pub shaped: Vec<Surface>,
-    /// Edges of roads and streams that there was no room for, beside which the ground slopes to the natural one.
+    /// Edges of roads that there was no room for, beside which the ground slopes to the natural one.
     pub shaped_slopes: Vec<[(Place, i32); 2]>,
     /// The surfaces of decks.
     pub decks: Vec<Face>,

@@ -91,6 +91,8 @@ mod lakes;
 pub use lakes::{Histogram, Lake, Shores, Waters, banks, level, lift_shores, outline_only, shore};
 mod afloat;
 pub use afloat::{afloat, with_water};
+mod watersides;
+pub use watersides::{WATERSIDE_REACH_M, Watersides, nearest_on};
 mod earthworks;
 pub use earthworks::{Earthworks, FarOff, Moved, OFF_M};
 mod parts;

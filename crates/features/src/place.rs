@@ -3,7 +3,7 @@
 //! It is the finest power-of-two fraction of a post that is a whole number of quanta, at most 64 steps a post, so a
 //! vertex has exact coordinates in a load module and every question about two features is one of whole numbers.
 
-use terrain::Spacing;
+use terrain::{LatticePoint, Spacing};
 
 /// Most lattice steps between neighbouring posts.
 pub const STEPS_PER_POST_MAX: i32 = 64;
@@ -37,6 +37,12 @@ impl Place {
     pub fn squared_to(self, other: Place) -> i64 {
         let [east, north] = self.to(other);
         east * east + north * north
+    }
+}
+
+impl From<Place> for LatticePoint {
+    fn from(Place { row, col }: Place) -> Self {
+        Self::new(row, col)
     }
 }
 

@@ -1,5 +1,4 @@
-//! What there is no room for still shapes the ground: roads lie flat across, lakes level, between banks and along
-//! streams water falls.
+//! What there is no room for still shapes the ground: roads lie flat across, lakes level, between banks water falls.
 
 use crate::choice::{Choice, Chosen, Why};
 use crate::forms::{Formed, Surface};
@@ -21,9 +20,6 @@ pub(crate) fn shape(choice: &Choice, chosen: &Chosen, strands: &[Strand], formed
             }),
             Part::Strands(numbers) => {
                 let outlines = numbers.iter().map(|number| &strands[*number as usize]);
-                let channels = outlines.clone().filter(|strand| strand.role == Role::Channel);
-                let pieces = channels.flat_map(|strand| strand.stations.windows(2));
-                formed.shaped_slopes.extend(pieces.map(|ends| [ends[0], ends[1]]));
                 formed.shaped.extend(outlines.filter(|strand| strand.role.is_outline()).map(|strand| Surface {
                     class: strand.class,
                     role: strand.role,

@@ -36,7 +36,7 @@ mod tests {
     use crate::samples;
     use terrain::{
         FeatureSurface, Features, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, Side, SideSpan,
-        SurfaceGround, Vertex, WayLine,
+        SurfaceGround, Vertex, Waterside, WayLine,
     };
 
     #[test]
@@ -56,6 +56,7 @@ mod tests {
             surfaces: SurfaceGround::ALL.map(surface).to_vec(),
             shaped: vec![surface(SurfaceGround::Lake)],
             slopes: vec![[vertices[0], vertices[1]]],
+            watersides: vec![Waterside { ends: [vertices[1], vertices[2]], ground: [5, -6] }],
             decks: vec![surface(SurfaceGround::Road)],
             lines: vec![WayLine {
                 class: 4,

@@ -19,10 +19,21 @@ pub struct TileFeatures {
     pub shaped: Vec<FeatureSurface>,
     /// Edges of roads within reach of the tile, beside which the ground slopes to the natural one.
     pub slopes: Vec<[Vertex; 2]>,
+    /// Pieces of water within reach of the tile, beside which the ground slopes to it.
+    pub watersides: Vec<Waterside>,
     /// Bridges: polygons above the ground, of all that touch the tile. Their rings are simple.
     pub decks: Vec<FeatureSurface>,
     /// Middle lines of all ways that touch the tile, in the ground or not; they change nothing in it.
     pub lines: Vec<WayLine>,
+}
+
+/// A piece of a channel, shore or bank from one station to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Waterside {
+    /// Its ends, at the heights of the water.
+    pub ends: [Vertex; 2],
+    /// Heights of the natural ground there, in quanta.
+    pub ground: [i32; 2],
 }
 
 /// The middle line of a way, or of a part of it in which nothing changes. It has a vertex wherever it crosses a line
@@ -96,6 +107,7 @@ impl TileFeatures {
             surfaces: Vec::new(),
             shaped: Vec::new(),
             slopes: Vec::new(),
+            watersides: Vec::new(),
             decks: Vec::new(),
             lines: Vec::new(),
         }
@@ -113,7 +125,8 @@ impl TileFeatures {
 
     /// Whether there is nothing that changes the ground or lies above it; lines do not.
     pub fn is_empty(&self) -> bool {
-        let Self { tile: _, kept, surfaces, shaped, slopes, decks, lines: _ } = self;
-        kept.is_empty() && surfaces.is_empty() && shaped.is_empty() && slopes.is_empty() && decks.is_empty()
+        let Self { tile: _, kept, surfaces, shaped, slopes, watersides, decks, lines: _ } = self;
+        let shapes_ground = !(shaped.is_empty() && slopes.is_empty() && watersides.is_empty());
+        kept.is_empty() && surfaces.is_empty() && !shapes_ground && decks.is_empty()
     }
 }

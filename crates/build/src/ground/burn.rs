@@ -1,11 +1,12 @@
 //! The working ground: the DEM with features burned in, as tiles are refined against it.
 //!
-//! On a road a post has the road's height, in water the level. Beside a road the ground slopes from its edge to the
-//! natural one, and no shore lies below its lake. Posts on roads and in water weigh nothing: their heights are decided.
+//! On a road a post has the road's height, in water the level. Beside roads and water the ground slopes from their
+//! edges to the natural one, and no shore lies below its lake. Posts on roads and in water weigh nothing: their heights
+//! are decided.
 
 use std::collections::HashMap;
 
-use features::{CUT_RUN, FILL_RUN};
+use features::{CUT_RUN, FILL_RUN, WATERSIDE_REACH_M, Watersides, nearest_on};
 use terrain::{Dem, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
@@ -19,6 +20,11 @@ pub fn slope_reach(spacing: Spacing) -> i32 {
     (SLOPE_REACH_M / spacing.metres()).ceil() as i32
 }
 
+/// Posts from water within which slopes may reach.
+pub fn waterside_reach(spacing: Spacing) -> i32 {
+    (WATERSIDE_REACH_M / spacing.metres()).ceil() as i32
+}
+
 /// A window with what features put into the ground of a tile that covers `tile`, as far as it reaches into it.
 pub fn burn(
     window: Window,
@@ -26,11 +32,13 @@ pub fn burn(
     tile: PostRect,
     (spacing, left_out_weight): (Spacing, f64),
 ) -> Window {
-    if features.surfaces.is_empty() && features.shaped.is_empty() && features.slopes.is_empty() {
+    let TileFeatures { surfaces, shaped, slopes, watersides, .. } = features;
+    if surfaces.is_empty() && shaped.is_empty() && slopes.is_empty() && watersides.is_empty() {
         return window;
     }
     let Some(within) = tile.intersection(&window.dem.rect()) else { return window };
     let mut burning = Burning::new(&window, features, within, spacing);
+    burning.watersides();
     burning.slopes();
     burning.surfaces();
     burning.shores();
@@ -98,13 +106,24 @@ impl<'a> Burning<'a> {
         Self { rect, within, features, spacing, steps: features.kept.steps_per_post, heights, class_of, is_shaped }
     }
 
+    /// Leads the ground beside water to it.
+    fn watersides(&mut self) {
+        let metres_per_step = self.spacing.metres() / f64::from(self.steps);
+        let watersides = Watersides::of(&self.features.watersides, metres_per_step);
+        for post in self.within.posts() {
+            let index = self.rect.index(post);
+            self.heights[index] = self.heights[index].map(|natural| watersides.ground(self.place(post), natural));
+        }
+    }
+
     /// Lowers and lifts the ground beside roads, each post by the edge nearest to it.
     fn slopes(&mut self) {
         let reach = slope_reach(self.spacing);
         let mut nearest: HashMap<usize, (f64, f64)> = HashMap::new();
         for &[a, b] in &self.features.slopes {
             for post in self.posts_near(&[a, b], reach) {
-                let (steps, height) = nearest_on([a, b], self.place(post));
+                let (steps, share) = nearest_on([a, b], self.place(post));
+                let height = f64::from(a.height) + share * f64::from(b.height - a.height);
                 let metres = steps * self.spacing.metres() / f64::from(self.steps);
                 let known = nearest.entry(self.rect.index(post)).or_insert((f64::INFINITY, 0.0));
                 if metres < known.0 || (metres == known.0 && height < known.1) {
@@ -188,17 +207,6 @@ impl<'a> Burning<'a> {
 
 fn rounded(quanta: f64) -> i32 {
     (quanta + 0.5).floor() as i32
-}
-
-/// How far, in steps, a place lies from an edge, and the height of the edge there, in quanta.
-fn nearest_on([a, b]: [Vertex; 2], at: LatticePoint) -> (f64, f64) {
-    let to = |end: LatticePoint| [end.col - a.at.col, end.row - a.at.row].map(f64::from);
-    let ([along_x, along_y], [x, y]) = (to(b.at), to(at));
-    let whole = along_x * along_x + along_y * along_y;
-    let share = if whole == 0.0 { 0.0 } else { ((x * along_x + y * along_y) / whole).clamp(0.0, 1.0) };
-    let (off_x, off_y) = (x - share * along_x, y - share * along_y);
-    let height = f64::from(a.height) + share * f64::from(b.height - a.height);
-    ((off_x * off_x + off_y * off_y).sqrt(), height)
 }
 
 /// Posts inside rings, holes left out: row by row, those between an odd and an even crossing. Vertices stand on a
@@ -420,6 +428,16 @@ mod tests {
         let featured = |row| window.featured.contains(&Post::new(row, 10));
         assert_eq!((featured(9), featured(8), featured(11), featured(17)), (true, false, true, false));
         assert_eq!(height(17), 12_800);
+    }
+
+    #[test]
+    fn ground_beside_water_slopes_to_it() {
+        let ends = [vertex(10.0, -20.0, -1536), vertex(10.0, 40.0, -1536)];
+        let watersides = vec![terrain::Waterside { ends, ground: [0; 2] }];
+        let window = burned(window(|_| Some(0)), &TileFeatures { watersides, ..features(Vec::new(), Vec::new()) });
+        let height = |row| window.dem.height(Post::new(row, 10));
+        assert_eq!([10, 11, 12, 13].map(height), [-1536, -896, -256, 0]);
+        assert!(window.featured.contains(&Post::new(8, 3)) && !window.featured.contains(&Post::new(7, 3)));
     }
 
     #[test]
