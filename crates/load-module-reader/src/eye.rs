@@ -315,7 +315,7 @@ impl Eye<'_> {
         lost
     }
 
-    /// A load module that is loaded, if it stands between the eye and a place, and the triangle of its ground that does.
+    /// A load module that is loaded, if it stands between the eye and a place, and its triangle that does.
     fn hidden_by(&self, row: u32, col: u32, ray: &Ray) -> Option<([u32; 2], Option<Corners>)> {
         let side = self.ground.frame().side;
         let (module, rises, line) = self.past(self.ground.block().index(row, col), ray)?;
