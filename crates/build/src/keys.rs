@@ -199,7 +199,7 @@ pub(crate) fn level(
         })
 }
 
-/// Rises whenever the same features may come to something else, or are written otherwise; jobs without them are as before.
+/// Rises whenever the same features may come to something else, or are written otherwise.
 const LEVEL_REVISION: u64 = 1;
 
 fn feed_features(builder: FingerprintBuilder, features: &Features) -> FingerprintBuilder {
