@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::ExportError;
 use source_files::{Crs, Imagery, Keep, SourceError, Square};
 
-/// Bytes of decoded strips and tiles that are kept: a row of tiles of 512 pixels across 60,000 of them.
-const KEPT_BYTES_MAX: usize = 128 << 20;
+/// Bytes of decoded strips and tiles that are kept: a row of tiles of 512 pixels across 49,000 of them.
+const KEPT_BYTES_MAX: usize = 96 << 20;
 /// Sides of what a picture draws at once are multiples of this.
 const SIDE_STEP: usize = 16;
 /// How many times the wanted texel one is that is told of.
