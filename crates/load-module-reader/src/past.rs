@@ -303,8 +303,8 @@ pub(crate) fn over_canopies(
     });
 }
 
-/// Adds the stretches in which those parts of a line lie below the tops of canopies, triangle by triangle of the ground,
-/// in cells of it that are wanted: by the canopy's height in quanta, row and column. Parts are joined where they meet.
+/// Adds the stretches in which those parts of a line lie below the tops of canopies, by triangles of the ground, in
+/// cells of it that are wanted: by the canopy's height in quanta, row and column. Parts are joined where they meet.
 pub(crate) fn in_canopies(
     module: &TerrainModule,
     side: u16,

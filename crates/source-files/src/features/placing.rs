@@ -139,13 +139,11 @@ impl Placing {
     }
 
     /// Whether something with this extent may lie near the area.
-    #[cfg(feature = "geoparquet")]
     pub(super) fn is_near(&self, extent: &Extent) -> bool {
         self.turned(extent).is_some()
     }
 
     /// Whether a shape may lie near the area, or has something that is to be told; counts one that does not.
-    #[cfg(feature = "geoparquet")]
     pub(super) fn is_shape_near(&mut self, shape: &RawShape) -> bool {
         let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
         let is_odd = shape.parts.is_empty() || shape.vertices().any(|vertex| !self.is_on_earth(vertex));
