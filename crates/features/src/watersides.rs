@@ -13,6 +13,9 @@ use crate::{Place, Strand};
 /// Metres from water beyond which no slope reaches.
 pub const WATERSIDE_REACH_M: f64 = 150.0;
 
+/// Metres along the side of a cell in which pieces are looked up: most reach less far.
+const CELL_M: f64 = 32.0;
+
 /// Run over rise of the slope from water to the natural ground: that of dykes. A flatter one moves more of the roads
 /// beside rivers far off the DEM.
 const BANK_RUN: f64 = 2.0;
@@ -39,7 +42,7 @@ pub struct Watersides<'a> {
 impl<'a> Watersides<'a> {
     /// Of pieces on a lattice with so many metres a step.
     pub fn of(pieces: &'a [Waterside], metres_per_step: f64) -> Self {
-        let side = (WATERSIDE_REACH_M / metres_per_step).ceil() as i32;
+        let side = (CELL_M / metres_per_step).ceil() as i32;
         let mut cells: HashMap<(i32, i32), Vec<&Waterside>> = HashMap::new();
         for piece in pieces {
             let run = offs(piece).map(run_of).into_iter().fold(0.0, f64::max);
