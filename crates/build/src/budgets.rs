@@ -80,6 +80,7 @@ pub struct Budgets {
     job: Job,
     read: Arc<ReadFeatures>,
     heard: Heard,
+    workers: Workers,
 }
 
 impl Budgets {
@@ -96,7 +97,7 @@ impl Budgets {
         let sounded = |&tile| Ok(sound(&area, &read, tile, &source.natural_tile(&area, tile)?.dem));
         let profiles: Vec<Profile> = area.tiles.iter().map(sounded).collect::<Result<_, CompileError>>()?;
         let heard = Heard::of(&read, profiles.iter());
-        Ok(Some(Self { job: job.clone(), read: Arc::new(read), heard }))
+        Ok(Some(Self { job: job.clone(), read: Arc::new(read), heard, workers }))
     }
 
     /// What ground they cover, in quanta.
@@ -116,7 +117,8 @@ impl Budgets {
         let area = GamingArea::new(&job)?;
         let spec = job.features.as_ref().expect("a job with features");
         let (sounded, shares) = (self.heard.sounded(), shares(&area.budget, spec));
-        let Levelled { reserved, .. } = self.read.features.level(sounded, (spec.options, spec.falls), &shares);
+        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&self.workers, count, piece);
+        let Levelled { reserved, .. } = self.read.features.level(sounded, (spec.options, spec.falls), &shares, &each);
         let lakes = reserved.amounts.values();
         let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
         let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();
@@ -157,7 +159,8 @@ pub(crate) fn enough_for(run: &Run) -> Result<Option<Budgeted>, CompileError> {
     let profile = |&tile: &TileId| Ok(run.database.folder().read_profile(tile)?.2);
     let profiles: Vec<Profile> = run.area.tiles.iter().map(profile).collect::<Result<_, CompileError>>()?;
     let heard = Heard::of(&read, profiles.iter());
-    let budgets = Budgets { job: run.job.clone(), read, heard };
+    let workers = Workers::new(run.workers.count());
+    let budgets = Budgets { job: run.job.clone(), read, heard, workers };
     let own = run.job.limits.mean_per_load_module;
     for mean in BUDGETS.into_iter().filter(|mean| own < f64::from(*mean)) {
         let budgeted = budgets.of_mean(mean)?;

@@ -47,7 +47,7 @@ pub fn foresee_features(job: &Job) -> Result<Option<FeaturesForeseen>, CompileEr
     // No limit, so that nothing is degraded.
     let inside = vec![Vec::new(); features.outlines().len()];
     let sounded = Sounded { heights: &level_ground, middles: &level_ground, inside: &inside };
-    let levelled = features.level(sounded, (spec.options, spec.falls), &Shares::all());
+    let levelled = features.level(sounded, (spec.options, spec.falls), &Shares::all(), &in_turn);
     let level = AreaLevel { cost: cost_of(job, area.grid, &levelled.reserved.cost), ..AreaLevel::default() };
     let mut modules = vec![0; area.grid.count()];
     level.cost.iter().for_each(|&(place, _, triangles)| modules[place as usize] += triangles);

@@ -201,11 +201,17 @@ impl AreaFeatures {
 
     /// Decides all heights, and forms features so that they take no more triangles than there is room for. Beyond the
     /// area a height of the DEM is that of the nearest place inside, and only features without any place inside rest
-    /// on it.
+    /// on it. `each` runs what falls into pieces.
     ///
     /// # Panics
     /// When there is not one height, or none, for each station, and one histogram for each outline.
-    pub fn level(&self, sounded: Sounded, (options, falls): (GradeOptions, FallOptions), shares: &Shares) -> Levelled {
+    pub fn level(
+        &self,
+        sounded: Sounded,
+        (options, falls): (GradeOptions, FallOptions),
+        shares: &Shares,
+        each: Each,
+    ) -> Levelled {
         let Sounded { heights, middles, inside } = sounded;
         assert_eq!([heights.len(), middles.len()], [self.stations.len(); 2], "the DEM was asked at every station");
         assert_eq!(inside.len(), self.outlines.len(), "the DEM was asked inside every outline");
@@ -247,7 +253,7 @@ impl AreaFeatures {
             let name = self.names.get(&id).copied().unwrap_or(0);
             kinds.get(&id).map(|traits| About { kind: traits.kind, name })
         };
-        let mut reserved = reserve(&graded, &strands, &self.site, shares, &about);
+        let mut reserved = reserve(&graded, &strands, &self.site, shares, &about, each);
         remarks.append(&mut reserved.formed.remarks);
         // What lies beyond the area is counted, not listed.
         remarks.retain(|remark| remark.flaw != Flaw::Outside);

@@ -303,7 +303,7 @@ mod tests {
         let inside = vec![inside.to_vec(); all.outlines().len()];
         let sounded = Sounded { heights: &ground, middles: &ground, inside: &inside };
         let options = (GradeOptions::USUAL, FallOptions::USUAL);
-        all.level(sounded, options, &Shares::each([8, 8], 1 << 20)).earthworks
+        all.level(sounded, options, &Shares::each([8, 8], 1 << 20), &in_turn).earthworks
     }
 
     fn only(works: &Earthworks) -> Earthwork {

@@ -5,7 +5,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use terrain::in_turn;
+use terrain::{Each, gather};
 
 use crate::clean::Notes;
 use crate::culverts::{Culvert, culvert, enter_culverts, is_near};
@@ -14,10 +14,10 @@ use crate::exact::Segment;
 use crate::middles::{Middle, middles};
 use crate::pieces::{Piece, pieces};
 use crate::rings::encloses;
-use crate::room::{Sharing, remark_rooms};
+use crate::room::{Changed, Sharing, by_corners, remark_rooms};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
-use crate::strips::{Face, Room, Wide};
+use crate::strips::{Face, Room, Wide, has_room};
 use crate::thin::{Station, Tolerance, thin};
 use crate::toes::toes;
 use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy, Site};
@@ -79,35 +79,48 @@ pub struct Formed {
     pub remarks: Vec<Remark>,
 }
 
-/// Forms a network and all other strands together.
-pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
+/// Forms a network and all other strands together; `each` runs what falls into pieces.
+pub fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each) -> Formed {
+    form_by(graded, strands, site, each, Some(Scope::NearChanged))
+}
+
+/// The same; `between` is what the rounds between the first and the last look at. Without it the first is all: about
+/// what features put into the ground, before strips give way to what would tilt them.
+pub(crate) fn form_by(graded: &Graded, strands: &[Strand], site: &Site, each: Each, between: Option<Scope>) -> Formed {
     let Graded { network, heights, grants, .. } = *graded;
     let mut remarks = Vec::new();
     let shared = shared_places(network, strands, grants);
     let stays = |place: Place| shared.contains(&place);
     let pieces = pieces(network, heights, site, &stays, grants);
     remark_narrow(network, &pieces, &mut remarks);
-    let mut sharing = Sharing::of(network, &pieces, heights);
     let thinned = |(number, strand): (usize, &Strand)| thinned(strand, grants.of_strand(number), site, &stays);
-    let mut thinned: Vec<Strand> = strands.iter().enumerate().filter_map(thinned).collect();
-    let (mut formed, culverts) = round_together(graded, &pieces, &mut sharing, &thinned, site);
-    if enter_culverts(&mut thinned, culverts) {
-        formed = round_together(graded, &pieces, &mut sharing, &thinned, site).0;
+    let thinned = strands.iter().enumerate().filter_map(thinned).collect();
+    let sharing = Sharing::of(network, &pieces, heights);
+    let mut forming = Forming { graded, pieces: &pieces, sharing, thinned, faces: Vec::new(), site, each };
+    let (mut formed, culverts) = forming.round_together(Scope::Whole);
+    if enter_culverts(&mut forming.thinned, culverts) {
+        formed = forming.round_together(Scope::Whole).0;
     }
-    // Each round takes the room of a strip or lowers a lake, so that there is a last one.
+    let Some(between) = between else { return formed };
+    // Each round takes the room of a strip or lowers a lake, so that there is a last one. A strip that gives way changes
+    // only what is near it, and only that is looked at until none does; the last round is one of all again.
+    let mut scope = Scope::Whole;
     loop {
-        let (tilted, uneven) = (tilted(&formed, network, &sharing), uneven(&formed));
-        if tilted.is_empty() && uneven.is_empty() {
+        let tilted = tilted(&formed, network, &forming.sharing);
+        let uneven = if scope == Scope::Whole { uneven(&formed) } else { BTreeMap::new() };
+        if tilted.is_empty() && uneven.is_empty() && scope == Scope::Whole {
             break;
         }
+        scope = if tilted.is_empty() || !uneven.is_empty() { Scope::Whole } else { between };
         for (lake, place) in uneven {
-            lower(&mut thinned, &lake);
+            lower(&mut forming.thinned, &lake);
             let mut notes = Notes { id: lake.id, lattice: site.lattice, remarks: &mut remarks };
             notes.write_at(place, Flaw::LevelsDisagree, Remedy::Levelled);
         }
-        tilted.into_iter().for_each(|number| sharing.narrow(number, Room::None));
-        formed = round_together(graded, &pieces, &mut sharing, &thinned, site).0;
+        tilted.into_iter().for_each(|number| forming.sharing.narrow(number, Room::None));
+        formed = forming.round_together(scope).0;
     }
+    let Forming { sharing, thinned, .. } = forming;
     formed.middles = middles(graded, (&pieces, &sharing.wide), (strands, &thinned), &formed.points, site);
     remark_rooms(network, &pieces, &sharing.wide, &mut remarks);
     formed.remarks.append(&mut remarks);
@@ -115,30 +128,54 @@ pub fn form(graded: &Graded, strands: &[Strand], site: &Site) -> Formed {
     formed
 }
 
-/// Rounds strips that have room, and all other lines, together; and where channels are to have stations more.
-fn round_together(
-    graded: &Graded,
-    pieces: &[Piece],
-    sharing: &mut Sharing,
-    thinned: &[Strand],
-    site: &Site,
-) -> (Formed, Vec<Culvert>) {
-    let Graded { network, heights, .. } = *graded;
-    let all = sharing.share_out();
-    let wide = &sharing.wide;
-    let toes = toes(graded, pieces, wide, &all);
-    let (decks, faces): (Vec<Face>, Vec<Face>) = all.into_iter().partition(|face| face.is_deck);
-    let mut lines = outlines(&faces);
-    lines.extend(toes);
-    lines.extend(centrelines(network, pieces, wide, heights));
-    lines.extend(thinned.iter().cloned());
-    lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
-    let mut remarks = Vec::new();
-    let (mut formed, culverts) = assemble(lines, &faces, site, &mut remarks);
-    (formed.faces, formed.decks, formed.remarks) = (faces, decks, remarks);
-    formed.faces.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
-    formed.decks.sort_by(|a, b| (a.class, &a.corners).cmp(&(b.class, &b.corners)));
-    (formed, culverts)
+/// How much is rounded together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scope {
+    Whole,
+    /// Lines near strips that lie otherwise than in the round before.
+    NearChanged,
+}
+
+/// Strips and lines while strips give way.
+struct Forming<'a> {
+    graded: &'a Graded<'a>,
+    pieces: &'a [Piece],
+    sharing: Sharing<'a>,
+    thinned: Vec<Strand>,
+    /// Strips on the ground in the round before, by class and corners.
+    faces: Vec<Face>,
+    site: &'a Site,
+    each: Each<'a>,
+}
+
+impl Forming<'_> {
+    /// Rounds strips that have room, and all other lines, together; and where channels are to have stations more.
+    fn round_together(&mut self, scope: Scope) -> (Formed, Vec<Culvert>) {
+        let Self { graded, pieces, site, .. } = *self;
+        let all = self.sharing.share_out();
+        let wide = &self.sharing.wide;
+        let mut lines = toes(graded, pieces, wide, &all);
+        let (mut decks, mut faces): (Vec<Face>, Vec<Face>) = all.into_iter().partition(|face| face.is_deck);
+        faces.sort_by(by_corners);
+        decks.sort_by(by_corners);
+        let before = std::mem::replace(&mut self.faces, faces.clone());
+        lines.extend(centrelines(graded.network, pieces, wide, graded.heights));
+        lines.extend(self.thinned.iter().cloned());
+        if scope == Scope::NearChanged {
+            let changed = Changed::between(&before, &faces, site.lattice);
+            faces.retain(|face| changed.is_around(&face.corners));
+            lines.retain(|line| line.stations.windows(2).any(|ends| changed.is_around(ends)));
+            lines.extend(outlines(&faces));
+            faces.retain(|face| changed.is_at(&face.corners));
+        } else {
+            lines.extend(outlines(&faces));
+        }
+        lines.sort_by(|a, b| (a.class, a.role, &a.stations, a.id).cmp(&(b.class, b.role, &b.stations, b.id)));
+        let mut remarks = Vec::new();
+        let (mut formed, culverts) = assemble(lines, site, &mut remarks, self.each);
+        (formed.faces, formed.decks, formed.remarks) = (faces, decks, remarks);
+        (formed, culverts)
+    }
 }
 
 /// A lake that meets water of a lower level, which is its level from now on.
@@ -271,13 +308,11 @@ fn outlines(faces: &[Face]) -> Vec<Strand> {
 
 /// The centrelines of what is no strip, as long as it goes.
 fn centrelines(network: &Network, pieces: &[Piece], wide: &[Wide], heights: &[i32]) -> Vec<Strand> {
-    let strips: BTreeSet<(u32, u32)> =
-        wide.iter().filter(|of| of.room != Room::None).map(|of| (of.piece, of.segment)).collect();
     let mut lines: Vec<Strand> = Vec::new();
     for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| !piece.is_deck()) {
         let mut open = false;
         for (segment, nodes) in piece.nodes.windows(2).enumerate() {
-            let is_line = !strips.contains(&(number as u32, segment as u32));
+            let is_line = !has_room(wide, number as u32, segment as u32);
             let [a, b] = [nodes[0], nodes[1]].map(|node| (network.nodes[node as usize].place, heights[node as usize]));
             let id = piece.id(network, segment);
             let goes_on = open && lines.last().is_some_and(|line| line.id == id);
@@ -300,14 +335,14 @@ type Decided = HashMap<Place, (Role, u16, Role, i32)>;
 type OfEdge = (u16, Role, FeatureId, bool);
 
 /// Rounds all lines together, decides the height of each point, and leaves out what lies in a strip of higher class.
-fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<Remark>) -> (Formed, Vec<Culvert>) {
+fn assemble(lines: Vec<Strand>, site: &Site, remarks: &mut Vec<Remark>, each: Each) -> (Formed, Vec<Culvert>) {
     let mut rounded: Vec<Vec<Place>> =
         lines.iter().map(|line| line.stations.iter().map(|(place, _)| *place).collect()).collect();
     let mut hot = Vec::new();
     for ends in rounded.iter().flat_map(|line| line.windows(2)) {
         site.crossings(Segment { a: ends[0], b: ends[1] }, &mut |place| hot.push(place));
     }
-    snap_round(&mut rounded, &hot, &in_turn);
+    snap_round(&mut rounded, &hot, each);
     let own: Vec<Vec<i32>> = lines.iter().zip(&rounded).map(|(line, places)| heights_along(line, places)).collect();
     let mut heights: Decided = HashMap::with_capacity(rounded.iter().map(Vec::len).sum());
     for ((line, places), own) in lines.iter().zip(&rounded).zip(&own) {
@@ -316,14 +351,16 @@ fn assemble(lines: Vec<Strand>, faces: &[Face], site: &Site, remarks: &mut Vec<R
             heights.entry(place).and_modify(|height| *height = mine.min(*height)).or_insert(mine);
         }
     }
-    let inside = Inside::new(faces, &lines, &rounded);
+    let inside = Inside::new(&lines, &rounded);
+    let covered = gather(each, lines.len().div_ceil(LINES_AT_ONCE), |piece| inside.covered(piece, &rounded)).concat();
+    let mut covered = covered.into_iter();
     let mut edges: Vec<((Place, Place), OfEdge)> = Vec::new();
     let mut culverts = Vec::new();
     for (number, (line, places)) in lines.iter().zip(&rounded).enumerate() {
         let mut cut = 0;
         for (at, ends) in places.windows(2).enumerate() {
             let passes = |at: usize| line.role == Role::Channel && heights[&places[at]].3 != own[number][at];
-            if inside.covers(number, ends[0], ends[1]) {
+            if covered.next().expect("of every edge whether it is covered") {
                 cut += site.lattice.length(ends[0], ends[1]);
             } else if !passes(at) && !passes(at + 1) {
                 let key = (ends[0].min(ends[1]), ends[0].max(ends[1]));
@@ -408,8 +445,8 @@ struct Inside {
     rings: Vec<(Vec<Place>, u16, usize)>,
     /// Rings by cells of the plane.
     cells: HashMap<(i32, i32), Vec<u32>>,
-    /// The rings each edge of a ring belongs to.
-    own: HashMap<(Place, Place), Vec<u32>>,
+    /// The edges of rings with the ring that each belongs to, sorted.
+    own: Vec<((Place, Place), u32)>,
     /// What each line is: its class and whether it is an outline.
     lines: Vec<(u16, bool)>,
 }
@@ -417,13 +454,16 @@ struct Inside {
 /// Half steps of a cell's side.
 const CELL: i32 = 256;
 
+/// Lines whose edges a worker looks at in one piece.
+const LINES_AT_ONCE: usize = 1024;
+
 impl Inside {
-    fn new(faces: &[Face], lines: &[Strand], rounded: &[Vec<Place>]) -> Self {
+    fn new(lines: &[Strand], rounded: &[Vec<Place>]) -> Self {
         let of_line = |line: &Strand| (line.class, line.role == Role::Side);
         let mut inside = Self {
-            rings: Vec::with_capacity(faces.len()),
+            rings: Vec::new(),
             cells: HashMap::new(),
-            own: HashMap::new(),
+            own: Vec::new(),
             lines: lines.iter().map(of_line).collect(),
         };
         for (number, (line, places)) in lines.iter().zip(rounded).enumerate() {
@@ -432,7 +472,7 @@ impl Inside {
             }
             let ring = inside.rings.len() as u32;
             for ends in places.windows(2) {
-                inside.own.entry((ends[0].min(ends[1]), ends[0].max(ends[1]))).or_default().push(ring);
+                inside.own.push(((ends[0].min(ends[1]), ends[0].max(ends[1])), ring));
             }
             let doubled: Vec<Place> =
                 places[1..].iter().map(|place| Place::new(2 * place.row, 2 * place.col)).collect();
@@ -447,7 +487,16 @@ impl Inside {
             }
             inside.rings.push((doubled, line.class, number));
         }
+        inside.own.sort_unstable();
         inside
+    }
+
+    /// Of each edge of the lines of a piece whether it lies inside a strip that keeps its place against it.
+    fn covered(&self, piece: usize, rounded: &[Vec<Place>]) -> Vec<bool> {
+        let lines = (0..).zip(rounded).skip(piece * LINES_AT_ONCE).take(LINES_AT_ONCE);
+        lines
+            .flat_map(|(line, places)| places.windows(2).map(move |ends| self.covers(line, ends[0], ends[1])))
+            .collect()
     }
 
     /// Whether an edge of a line lies inside a strip that keeps its place against it.
@@ -456,12 +505,12 @@ impl Inside {
         let Some(near) = self.cells.get(&(middle.row.div_euclid(CELL), middle.col.div_euclid(CELL))) else {
             return false;
         };
-        let own = self.own.get(&(a.min(b), a.max(b)));
+        let is_own = |ring: u32| self.own.binary_search(&((a.min(b), a.max(b)), ring)).is_ok();
         let (class, is_side) = self.lines[line];
         near.iter().any(|ring| {
             let (places, ring_class, ring_line) = &self.rings[*ring as usize];
             let keeps = *ring_class < class || (*ring_class == class && (!is_side || *ring_line < line));
-            keeps && !own.is_some_and(|own| own.contains(ring)) && encloses(places, middle)
+            keeps && encloses(places, middle) && !is_own(*ring)
         })
     }
 }

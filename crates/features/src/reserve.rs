@@ -6,10 +6,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use terrain::Each;
+
 use crate::choice::{Amiss, Choice, Chosen, Why, ids};
 use crate::clean::Notes;
 use crate::cost::{Cost, cost};
-use crate::forms::{Formed, form};
+use crate::forms::{Formed, Scope, form_by};
 use crate::outlay::Outlays;
 use crate::shapes::shape;
 use crate::shares::{Ledger, Shares, Tier, taken};
@@ -72,7 +74,7 @@ pub struct LeftOut {
 const ROUNDS: usize = 2;
 
 /// Forms features so that they take no more triangles than there is room for. `about` says of a feature what nothing
-/// that is formed does.
+/// that is formed does; `each` runs what falls into pieces.
 ///
 /// What has no room is a remark on each of its features.
 pub fn reserve(
@@ -81,6 +83,7 @@ pub fn reserve(
     site: &Site,
     shares: &Shares,
     about: &dyn Fn(FeatureId) -> Option<About>,
+    each: Each,
 ) -> Reserved {
     let stretches = Stretches::of(graded, strands, site, about);
     let strokes = strokes(&stretches, graded, strands, site);
@@ -101,11 +104,12 @@ pub fn reserve(
             taking_back = TakingBack::new(&choice);
         }
         let grants = grants(&choice, &chosen, strands.len());
-        let formed = form(&Graded { grants: &grants, ..*graded }, strands, site);
+        let rounds = (!chosen.is_bound || 0 < round).then_some(Scope::NearChanged);
+        let formed = form_by(&Graded { grants: &grants, ..*graded }, strands, site, each, rounds);
         let cost = cost(&formed, site);
         let taken = taken(&cost, shares);
         let fits = Ledger::new(shares, &taken).surplus().iter().all(|surplus| *surplus == 0);
-        if fits && (!chosen.is_bound || 0 < round) {
+        if fits && rounds.is_some() {
             return Reserved::of(&choice, &chosen, strands, formed, cost, grants);
         }
         if round < ROUNDS {

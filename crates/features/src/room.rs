@@ -1,13 +1,14 @@
 //! Who gets the room where strips overlap: the higher class; the other becomes narrower, then a line.
 
-use std::collections::BTreeSet;
+use std::cmp::Ordering;
+use std::collections::{BTreeSet, HashSet};
 
 use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::pieces::Piece;
 use crate::quarters::SegmentPairs;
-use crate::strips::{Arm, Face, Room, Wide, arms, faces, wide_segments};
-use crate::{Flaw, Network, Place, Remark, Remedy};
+use crate::strips::{Arm, Face, Room, Wide, arms, faces, has_room, wide_segments};
+use crate::{FeatureLattice, Flaw, Network, Place, Remark, Remedy};
 
 /// Rounds of narrowing: each takes a strip that overlaps from whole to half or from half to none.
 const ROUNDS: usize = 4;
@@ -66,6 +67,59 @@ impl<'a> Sharing<'a> {
     }
 }
 
+/// The order of faces: by class, then by corners with their heights.
+pub(crate) fn by_corners(a: &Face, b: &Face) -> Ordering {
+    (a.class, &a.corners).cmp(&(b.class, &b.corners))
+}
+
+/// Where faces changed, as squares of the plane.
+pub(crate) struct Changed {
+    /// Steps of a square's side.
+    side: i32,
+    /// Squares in which faces changed, and those next to them.
+    at: HashSet<[i32; 2]>,
+    /// Those and the next ones.
+    around: HashSet<[i32; 2]>,
+}
+
+impl Changed {
+    /// Metres of a square's side: farther than rounding and heights at shared places reach.
+    const SIDE_M: f64 = 64.0;
+
+    /// Where faces differ from those before, all in the order of [`by_corners`].
+    pub fn between(before: &[Face], after: &[Face], lattice: FeatureLattice) -> Self {
+        let side = lattice.steps_in(Self::SIDE_M).max(1) as i32;
+        let mut changed = Self { side, at: HashSet::new(), around: HashSet::new() };
+        for (faces, others) in [(before, after), (after, before)] {
+            for face in faces.iter().filter(|face| others.binary_search_by(|other| by_corners(other, face)).is_err()) {
+                changed.at.extend(changed.squares(&face.corners, 1));
+                changed.around.extend(changed.squares(&face.corners, 2));
+            }
+        }
+        changed
+    }
+
+    /// Whether the box of some places is where faces changed or next to it.
+    pub fn is_at(&self, places: &[(Place, i32)]) -> bool {
+        self.squares(places, 0).any(|square| self.at.contains(&square))
+    }
+
+    /// The same, farther away.
+    pub fn is_around(&self, places: &[(Place, i32)]) -> bool {
+        self.squares(places, 0).any(|square| self.around.contains(&square))
+    }
+
+    /// The squares of the box of some places, and `more` on each side.
+    fn squares(&self, places: &[(Place, i32)], more: i32) -> impl Iterator<Item = [i32; 2]> + use<> {
+        let span = |of: fn(&(Place, i32)) -> i32| {
+            let low = places.iter().map(of).min().map_or(0, |low| low.div_euclid(self.side) - more);
+            low..places.iter().map(of).max().map_or(low, |high| high.div_euclid(self.side) + more + 1)
+        };
+        let (rows, cols) = (span(|(place, _)| place.row), span(|(place, _)| place.col));
+        rows.flat_map(move |row| cols.clone().map(move |col| [row, col]))
+    }
+}
+
 /// Writes down which strips others left less room than they ask for.
 pub(crate) fn remark_rooms(network: &Network, pieces: &[Piece], wide: &[Wide], remarks: &mut Vec<Remark>) {
     let mut told = BTreeSet::new();
@@ -103,11 +157,9 @@ impl Sharing<'_> {
             }
             parts.push(Part { rank: (face.class, least), nodes: &face.nodes, face: Some(number as u32) });
         }
-        let is_wide: BTreeSet<(u32, u32)> =
-            wide.iter().filter(|of| of.room != Room::None).map(|of| (of.piece, of.segment)).collect();
         for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| !piece.is_deck()) {
             for (segment, nodes) in piece.nodes.windows(2).enumerate() {
-                if !is_wide.contains(&(number as u32, segment as u32)) {
+                if !has_room(wide, number as u32, segment as u32) {
                     let [a, b] = [nodes[0], nodes[1]].map(|node| network.nodes[node as usize].place);
                     segments.push(Segment { a, b });
                     owners.push(parts.len() as u32);

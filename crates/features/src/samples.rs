@@ -3,6 +3,7 @@
 use terrain::{Post, PostRect, Spacing, in_turn};
 
 use crate::exact::Segment;
+use crate::forms::{Scope, form_by};
 use crate::{
     AreaFeatures, FallOptions, FeatureId, Form, Formed, FormedEdge, GradeOptions, Graded, Grants, Levelled, Network,
     Numbering, Place, Position, Remark, Role, Rounded, Shape, Shares, Site, Sounded, Source, Strand, Way, form, grade,
@@ -57,7 +58,7 @@ pub fn levelled(sources: Vec<Source>, metres: impl Fn(f64, f64) -> f64, shares: 
 pub fn level_usual(all: &AreaFeatures, ground: &[Option<i32>], shares: &Shares) -> Levelled {
     let inside = vec![Vec::new(); all.outlines().len()];
     let sounded = Sounded { heights: ground, middles: ground, inside: &inside };
-    all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares)
+    all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares, &in_turn)
 }
 
 /// Roads formed over a ground, and channels that lie on it; all edges are checked to touch at points only.
@@ -92,7 +93,9 @@ fn formed_of(rounded: Rounded, metres: impl Fn(f64, f64) -> f64) -> Formed {
     let strands: Vec<Strand> = flowing.iter().map(strand).collect();
     let grants = Grants::default();
     let graded = Graded { network: &network, heights: &heights, beside: &beside, grants: &grants };
-    let mut formed = form(&graded, &strands, &site());
+    let mut formed = form(&graded, &strands, &site(), &in_turn);
+    let by_whole = form_by(&graded, &strands, &site(), &in_turn, Some(Scope::Whole));
+    assert_eq!(formed, by_whole, "a strip that gives way changes only what is near it");
     check(&formed);
     formed.remarks.extend(remarks);
     Remark::sort(&mut formed.remarks);

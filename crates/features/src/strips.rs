@@ -63,7 +63,13 @@ impl Face {
     }
 }
 
-/// The segments of pieces that are strips, on the ground or on decks.
+/// Whether a segment of a piece is a strip that has room; `wide` as [`wide_segments`] has it.
+pub(crate) fn has_room(wide: &[Wide], piece: u32, segment: u32) -> bool {
+    let found = wide.binary_search_by_key(&(piece, segment), |of| (of.piece, of.segment));
+    found.is_ok_and(|number| wide[number].room != Room::None)
+}
+
+/// The segments of pieces that are strips, on the ground or on decks, in the order of pieces and segments.
 pub(crate) fn wide_segments(pieces: &[Piece]) -> Vec<Wide> {
     let mut wide = Vec::new();
     for (piece, of) in pieces.iter().enumerate() {

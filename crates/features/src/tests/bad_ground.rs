@@ -37,7 +37,7 @@ impl Laid {
         let inside = vec![Vec::new(); all.outlines().len()];
         let sounded = Sounded { heights: &ground, middles: &middles, inside: &inside };
         let options = (GradeOptions::USUAL, FallOptions::USUAL);
-        let levelled = all.level(sounded, options, &Shares::each([8, 8], 1 << 20));
+        let levelled = all.level(sounded, options, &Shares::each([8, 8], 1 << 20), &in_turn);
         let heights = levelled.reserved.formed.points.iter().copied().collect();
         let laid = Self { levelled, heights };
         laid.falls();

@@ -45,7 +45,7 @@ fn levelled(sources: &[Source], shares: &Shares) -> Levelled {
     let ground: Vec<Option<i32>> = all.stations().iter().map(ground).collect();
     let inside = vec![Vec::new(); all.outlines().len()];
     let sounded = Sounded { heights: &ground, middles: &ground, inside: &inside };
-    let levelled = all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares);
+    let levelled = all.level(sounded, (GradeOptions::USUAL, FallOptions::USUAL), shares, &in_turn);
     check_limits(&levelled, shares);
     levelled
 }

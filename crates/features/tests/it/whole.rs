@@ -86,7 +86,7 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     let beside: Vec<[i32; 2]> = sides(&roads).iter().map(|sides| sides.map(|place| dem(place).unwrap_or(0))).collect();
     let grants = Grants::default();
     let graded = Graded { network: &roads, heights: &heights, beside: &beside, grants: &grants };
-    let reserved = reserve(&graded, &strands, &site, &Shares::each([4, 4], most.into()), &|_| None);
+    let reserved = reserve(&graded, &strands, &site, &Shares::each([4, 4], most.into()), &|_| None, &in_turn);
     remarks.extend(reserved.formed.remarks.clone());
     Remark::sort(&mut remarks);
     Whole { reserved, waters, outlines: rounded.outlines, remarks }
