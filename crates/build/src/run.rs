@@ -150,7 +150,9 @@ impl Run<'_> {
     pub fn settle(&mut self, file: FileStamp, level: AreaLevel) {
         let left_out_weight = self.job.features.as_ref().map_or(1.0, |spec| spec.left_out_weight);
         self.ground.burn_in(self.database.folder(), &self.area, left_out_weight);
-        self.read = OnceLock::new();
+        if self.job.objects.is_none() {
+            self.read = OnceLock::new();
+        }
         let left_out = LeftOut::of(self.job, &self.area, &level);
         self.level = Some(Settled { file, level, left_out });
         self.area.budget.reserved = self.reserved();
@@ -158,6 +160,7 @@ impl Run<'_> {
 
     /// From now on it is decided what stands on the ground, and what of it counts in the limits is taken from them.
     pub fn stand(&mut self, file: FileStamp, outlines: AreaOutlines) {
+        self.read = OnceLock::new();
         self.outlines = Some((file, Arc::new(outlines)));
         self.area.budget.reserved = self.reserved();
     }
