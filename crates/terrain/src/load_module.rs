@@ -1,7 +1,5 @@
 //! A load module: what the simulator loads at once.
 
-use std::collections::HashMap;
-
 use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleVertex, Objects, module_line};
 
 /// One finished load module.
@@ -175,21 +173,14 @@ impl LoadModule {
     }
 
     fn check_edges(&self) -> Result<(), LoadModuleFault> {
-        let mut edges = HashMap::new();
-        for triangle in &self.triangles {
-            for i in 0..3 {
-                let (from, to) = (triangle[i], triangle[(i + 1) % 3]);
-                if edges.insert((from, to), ()).is_some() {
-                    return Err(self.crack(from, to));
-                }
-            }
-        }
-        let mut open: Vec<_> = edges
-            .keys()
-            .filter(|(from, to)| !edges.contains_key(&(*to, *from)) && !self.on_one_side(*from, *to))
-            .collect();
-        open.sort();
-        open.first().map_or(Ok(()), |&&(from, to)| Err(self.crack(from, to)))
+        let corners = |triangle: &[u16; 3]| [0, 1, 2].map(|corner| (triangle[corner], triangle[(corner + 1) % 3]));
+        let mut edges: Vec<(u16, u16)> = self.triangles.iter().flat_map(corners).collect();
+        edges.sort_unstable();
+        let is_open =
+            |&(from, to): &(u16, u16)| edges.binary_search(&(to, from)).is_err() && !self.on_one_side(from, to);
+        let twice = edges.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
+        let open = || edges.iter().copied().find(is_open);
+        twice.or_else(open).map_or(Ok(()), |(from, to)| Err(self.crack(from, to)))
     }
 
     fn crack(&self, from: u16, to: u16) -> LoadModuleFault {
