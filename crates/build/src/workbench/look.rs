@@ -153,6 +153,10 @@ const PART_M: f64 = 50_000.0;
 const SIDE_M: f64 = 500.0;
 /// Load modules along a side of a tile, about: the founding paper's.
 const MODULES_A_TILE: f64 = 17.0;
+/// Tiles along a side of a smaller area, so that workers find some that are not adjacent, as long as each has
+/// [`MODULES_A_TILE_MIN`] load modules along its own.
+const TILES_A_SIDE: u32 = 4;
+const MODULES_A_TILE_MIN: u32 = 6;
 
 /// Looks at rasters and finds the area that suits them. `given` is the system of those that name none.
 ///
@@ -187,7 +191,10 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
         let found = format!("room for {} x {} load modules of {SIDE_M} m", modules[1], modules[0]);
         return Err(impossible(found, "two each way are the least; give more files, or a larger raster".into()));
     }
-    let tiles = modules.map(|modules| ((f64::from(modules) / MODULES_A_TILE).round() as u32).clamp(1, modules / 2));
+    let tiles = modules.map(|modules| {
+        let at_once = (modules / MODULES_A_TILE_MIN).min(TILES_A_SIDE);
+        ((f64::from(modules) / MODULES_A_TILE).round() as u32).max(at_once).clamp(1, modules / 2)
+    });
     let (spacing_m, tiles) = (spacing.metres(), (tiles[1], tiles[0]));
     let posts_m = posts_m(&frames, &crs);
     let around = rectangle_around(&frames, &crs).unwrap_or([origin_m; 2]);
