@@ -98,6 +98,22 @@ fn a_lake_over_four_tiles_with_an_island_is_level_and_no_shore_lies_below_it() {
 }
 
 #[test]
+fn a_road_through_a_lake_or_along_its_shore_leaves_it_level() {
+    let shore = [(700.0, 700.0), (1300.0, 650.0), (1350.0, 1300.0), (720.0, 1280.0)];
+    let drawn = [
+        polygon("natural=water", &shore),
+        line("highway=primary", &[(50.0, 1000.0), (1950.0, 1010.0)]),
+        line("highway=residential", &[(697.0, 600.0), (697.0, 700.0), (717.0, 1290.0), (300.0, 1500.0)]),
+    ];
+    let laid = Drawing::new(noisy, &drawn).built();
+    assert_eq!(laid.heights_of(Kind::Lake).len(), 1, "all vertices of the lake have one height");
+    let [causeway, water] = [(1000.0, 1005.0), (1000.0, 1040.0)];
+    assert_eq!([laid.class(causeway), laid.class(water)], ["primary", "lake"]);
+    let above = laid.height(causeway) - laid.height(water);
+    assert!(above.abs() < 1.0 / 64.0, "the causeway lies {above} m above the water");
+}
+
+#[test]
 fn a_dam_keeps_two_levels_apart() {
     let drawn = [
         polygon("natural=water", &[(600.0, 600.0), (1400.0, 600.0), (1400.0, 1400.0), (600.0, 1400.0)]),
