@@ -11,9 +11,9 @@ use crate::clean::Notes;
 use crate::culverts::{Culvert, culvert, enter_culverts, is_near};
 use crate::decks::between;
 use crate::exact::Segment;
+use crate::inside::{Inside, LINES_AT_ONCE};
 use crate::middles::{Middle, middles};
 use crate::pieces::{Piece, pieces};
-use crate::rings::encloses;
 use crate::room::{Changed, Sharing, by_corners, remark_rooms};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
@@ -79,14 +79,10 @@ pub struct Formed {
     pub remarks: Vec<Remark>,
 }
 
-/// Forms a network and all other strands together; `each` runs what falls into pieces.
-pub fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each) -> Formed {
-    form_by(graded, strands, site, each, Some(Scope::NearChanged))
-}
-
-/// The same; `between` is what the rounds between the first and the last look at. Without it the first is all: about
-/// what features put into the ground, before strips give way to what would tilt them.
-pub(crate) fn form_by(graded: &Graded, strands: &[Strand], site: &Site, each: Each, between: Option<Scope>) -> Formed {
+/// Forms a network and all other strands together; `each` runs what falls into pieces, and `between` is what the rounds
+/// between the first and the last look at. Without it the first is all: about what features put into the ground, before
+/// strips give way to what would tilt them.
+pub(crate) fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each, between: Option<Scope>) -> Formed {
     let Graded { network, heights, grants, .. } = *graded;
     let mut remarks = Vec::new();
     let shared = shared_places(network, strands, grants);
@@ -102,8 +98,8 @@ pub(crate) fn form_by(graded: &Graded, strands: &[Strand], site: &Site, each: Ea
         formed = forming.round_together(Scope::Whole).0;
     }
     let Some(between) = between else { return formed };
-    // Each round takes the room of a strip or lowers a lake, so that there is a last one. A strip that gives way changes
-    // only what is near it, and only that is looked at until none does; the last round is one of all again.
+    // Each round takes the room of a strip or lowers a lake, so that there is a last one. A strip that gives way
+    // changes only what is near it, and only that is looked at until none does; the last round is one of all again.
     let mut scope = Scope::Whole;
     loop {
         let tilted = tilted(&formed, network, &forming.sharing);
@@ -437,82 +433,6 @@ fn heights_along(line: &Strand, places: &[Place]) -> Vec<i32> {
         heights.push(between([here.0, next.0], [here.1, next.1], place));
     }
     heights
-}
-
-/// Which places lie in which strips, after rounding.
-struct Inside {
-    /// Rings in half steps, with their class and the number of their line.
-    rings: Vec<(Vec<Place>, u16, usize)>,
-    /// Rings by cells of the plane.
-    cells: HashMap<(i32, i32), Vec<u32>>,
-    /// The edges of rings with the ring that each belongs to, sorted.
-    own: Vec<((Place, Place), u32)>,
-    /// What each line is: its class and whether it is an outline.
-    lines: Vec<(u16, bool)>,
-}
-
-/// Half steps of a cell's side.
-const CELL: i32 = 256;
-
-/// Lines whose edges a worker looks at in one piece.
-const LINES_AT_ONCE: usize = 1024;
-
-impl Inside {
-    fn new(lines: &[Strand], rounded: &[Vec<Place>]) -> Self {
-        let of_line = |line: &Strand| (line.class, line.role == Role::Side);
-        let mut inside = Self {
-            rings: Vec::new(),
-            cells: HashMap::new(),
-            own: Vec::new(),
-            lines: lines.iter().map(of_line).collect(),
-        };
-        for (number, (line, places)) in lines.iter().zip(rounded).enumerate() {
-            if line.role != Role::Side {
-                continue;
-            }
-            let ring = inside.rings.len() as u32;
-            for ends in places.windows(2) {
-                inside.own.push(((ends[0].min(ends[1]), ends[0].max(ends[1])), ring));
-            }
-            let doubled: Vec<Place> =
-                places[1..].iter().map(|place| Place::new(2 * place.row, 2 * place.col)).collect();
-            let span = |of: fn(&Place) -> i32| {
-                let (low, high) = (doubled.iter().map(of).min(), doubled.iter().map(of).max());
-                low.unwrap_or(0).div_euclid(CELL)..=high.unwrap_or(0).div_euclid(CELL)
-            };
-            for row in span(|place| place.row) {
-                for col in span(|place| place.col) {
-                    inside.cells.entry((row, col)).or_default().push(ring);
-                }
-            }
-            inside.rings.push((doubled, line.class, number));
-        }
-        inside.own.sort_unstable();
-        inside
-    }
-
-    /// Of each edge of the lines of a piece whether it lies inside a strip that keeps its place against it.
-    fn covered(&self, piece: usize, rounded: &[Vec<Place>]) -> Vec<bool> {
-        let lines = (0..).zip(rounded).skip(piece * LINES_AT_ONCE).take(LINES_AT_ONCE);
-        lines
-            .flat_map(|(line, places)| places.windows(2).map(move |ends| self.covers(line, ends[0], ends[1])))
-            .collect()
-    }
-
-    /// Whether an edge of a line lies inside a strip that keeps its place against it.
-    fn covers(&self, line: usize, a: Place, b: Place) -> bool {
-        let middle = Place::new(a.row + b.row, a.col + b.col);
-        let Some(near) = self.cells.get(&(middle.row.div_euclid(CELL), middle.col.div_euclid(CELL))) else {
-            return false;
-        };
-        let is_own = |ring: u32| self.own.binary_search(&((a.min(b), a.max(b)), ring)).is_ok();
-        let (class, is_side) = self.lines[line];
-        near.iter().any(|ring| {
-            let (places, ring_class, ring_line) = &self.rings[*ring as usize];
-            let keeps = *ring_class < class || (*ring_class == class && (!is_side || *ring_line < line));
-            keeps && encloses(places, middle) && !is_own(*ring)
-        })
-    }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use terrain::Each;
 use crate::choice::{Amiss, Choice, Chosen, Why, ids};
 use crate::clean::Notes;
 use crate::cost::{Cost, cost};
-use crate::forms::{Formed, Scope, form_by};
+use crate::forms::{Formed, Scope, form};
 use crate::outlay::Outlays;
 use crate::shapes::shape;
 use crate::shares::{Ledger, Shares, Tier, taken};
@@ -105,7 +105,7 @@ pub fn reserve(
         }
         let grants = grants(&choice, &chosen, strands.len());
         let rounds = (!chosen.is_bound || 0 < round).then_some(Scope::NearChanged);
-        let formed = form_by(&Graded { grants: &grants, ..*graded }, strands, site, each, rounds);
+        let formed = form(&Graded { grants: &grants, ..*graded }, strands, site, each, rounds);
         let cost = cost(&formed, site);
         let taken = taken(&cost, shares);
         let fits = Ledger::new(shares, &taken).surplus().iter().all(|surplus| *surplus == 0);

@@ -3,11 +3,11 @@
 use terrain::{Post, PostRect, Spacing, in_turn};
 
 use crate::exact::Segment;
-use crate::forms::{Scope, form_by};
+use crate::forms::{Scope, form};
 use crate::{
     AreaFeatures, FallOptions, FeatureId, Form, Formed, FormedEdge, GradeOptions, Graded, Grants, Levelled, Network,
-    Numbering, Place, Position, Remark, Role, Rounded, Shape, Shares, Site, Sounded, Source, Strand, Way, form, grade,
-    mend, round, sides, sort_out, touch_at_vertices_only,
+    Numbering, Place, Position, Remark, Role, Rounded, Shape, Shares, Site, Sounded, Source, Strand, Way, grade, mend,
+    round, sides, sort_out, touch_at_vertices_only,
 };
 
 /// An area of 400 x 400 posts of 10 m, load modules of 50 posts, tiles of 200.
@@ -93,8 +93,8 @@ fn formed_of(rounded: Rounded, metres: impl Fn(f64, f64) -> f64) -> Formed {
     let strands: Vec<Strand> = flowing.iter().map(strand).collect();
     let grants = Grants::default();
     let graded = Graded { network: &network, heights: &heights, beside: &beside, grants: &grants };
-    let mut formed = form(&graded, &strands, &site(), &in_turn);
-    let by_whole = form_by(&graded, &strands, &site(), &in_turn, Some(Scope::Whole));
+    let mut formed = form(&graded, &strands, &site(), &in_turn, Some(Scope::NearChanged));
+    let by_whole = form(&graded, &strands, &site(), &in_turn, Some(Scope::Whole));
     assert_eq!(formed, by_whole, "a strip that gives way changes only what is near it");
     check(&formed);
     formed.remarks.extend(remarks);
