@@ -20,6 +20,12 @@ pub fn start_triangles(grid: ModuleGrid, module: ModuleId, border_step: i32) -> 
     2 + points_per_side * outer_sides.into_iter().filter(|&outer| outer).count() as u32
 }
 
+/// Triangles of all load modules before any point is chosen, without asking each of them.
+pub fn start_triangles_of_area(grid: ModuleGrid, border_step: i32) -> u64 {
+    let points_per_side = (grid.side_cells / border_step - 1) as u64;
+    2 * grid.count() as u64 + points_per_side * 2 * (u64::from(grid.rows) + u64::from(grid.cols))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

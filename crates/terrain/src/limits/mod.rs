@@ -4,7 +4,7 @@
 //! `E` inner edges of its polygons: triangles = 2 V + B - 2, polygons = 1 + E - V.
 
 mod count;
-pub use count::{polygons_of, start_triangles, triangles_of};
+pub use count::{polygons_of, start_triangles, start_triangles_of_area, triangles_of};
 mod windows;
 pub use windows::Windows;
 mod lines;

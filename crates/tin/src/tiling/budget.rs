@@ -1,6 +1,6 @@
 //! The area's limits, and whether they leave room for the points every build starts from.
 
-use terrain::limits::{Windows, start_triangles};
+use terrain::limits::{Windows, start_triangles, start_triangles_of_area};
 use terrain::{ModuleGrid, ModuleId};
 
 use crate::tiling::Tiling;
@@ -70,7 +70,8 @@ impl Budget {
 
     /// Triangles of the area before any point is chosen.
     pub fn start_total(&self) -> u64 {
-        self.start().iter().map(|&count| u64::from(count)).sum()
+        let reserved = self.reserved.iter().map(|&count| u64::from(count));
+        start_triangles_of_area(self.grid, self.border_step) + reserved.sum::<u64>()
     }
 
     /// Whether the initial points fit.
@@ -118,6 +119,12 @@ mod tests {
     fn limits_below_the_initial_points_are_told_apart() {
         // 100 modules of 2, 40 outer sides of 3 more: corner load modules have 8.
         assert_eq!(budget(100, 3200, 4096).start_total(), 320);
+        for (rows, cols) in [(1, 1), (1, 7), (2, 1), (5, 3)] {
+            let grid = ModuleGrid { rows, cols, side_cells: 20 };
+            let reserved = (0..rows * cols).collect();
+            let of = Budget { grid, windows: Windows::new(grid, 8), reserved, ..budget(100, 3200, 4096) };
+            assert_eq!(of.start_total(), of.start().into_iter().map(u64::from).sum::<u64>(), "{rows} x {cols}");
+        }
         assert_eq!(budget(100, 3200, 4096).check(), Ok(()));
         let module = ModuleId { row: 0, col: 0 };
         assert_eq!(budget(7, 3200, 4096).check(), Err(BudgetFault::Module { module, start: 8, limit: 7 }));
