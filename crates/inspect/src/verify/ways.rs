@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use build::ground::GamingArea;
 use job::Job;
-use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, metres_of_quanta};
+use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, QUANTA_PER_METRE, metres_of_quanta};
 
 use super::laid::place_text;
 use super::modules::Modules;
@@ -15,6 +15,8 @@ use super::square::{At, Square};
 const BARE_MIN_M: f64 = 3.0;
 /// Longer stretches without edges are gaps, in metres.
 const GAP_MIN_M: f64 = 30.0;
+/// A deck that lies farther above or below a line carries another way, in quanta.
+const DECK_OFF: i32 = QUANTA_PER_METRE;
 
 /// What is found of the ways of an area.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,7 +71,8 @@ impl Ways {
             self.found.kept_m += places.windows(2).map(length_m).sum::<f64>();
         }
         if traits.is_in_ground {
-            self.look(&places, traits.kind, ground);
+            let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
+            self.look(&places, &heights, traits.kind, ground);
         }
         if traits.kind == LineKind::Breakline {
             return;
@@ -89,12 +92,12 @@ impl Ways {
     }
 
     /// Looks for the pieces of a line in the triangles: stretches along which no edge and no other way's ground lies.
-    fn look(&mut self, places: &[At], kind: LineKind, ground: &Ground) {
+    fn look(&mut self, places: &[At], heights: &[i32], kind: LineKind, ground: &Ground) {
         let mut bare: Vec<(f64, f64, At)> = Vec::new();
         let mut along_m = 0.0;
-        for ends in places.windows(2) {
+        for (ends, heights) in places.windows(2).zip(heights.windows(2)) {
             let length_m = length_m(ends);
-            for (from, to) in ground.bare(ends[0], ends[1]) {
+            for (from, to) in ground.bare([ends[0], ends[1]], [heights[0], heights[1]]) {
                 let (from, to) = (along_m + from * length_m, along_m + to * length_m);
                 match bare.last_mut() {
                     Some(last) if from - last.1 < BARE_MIN_M => last.1 = to,
@@ -154,6 +157,9 @@ struct Ground<'a> {
     square: Square<'a>,
     /// Triangles that have a class of features.
     of_features: Vec<[At; 3]>,
+    /// Triangles of decks with their lowest and highest vertex: beside a way that forks where it leaves a bridge, the
+    /// deck reaches as far as both are apart.
+    of_decks: Vec<([At; 3], [i32; 2])>,
     /// How far edges may lie off a line that was rounded with them, in quanta.
     aside: f64,
 }
@@ -164,17 +170,29 @@ impl<'a> Ground<'a> {
         let of_features = module.triangles.iter().zip(&module.classes);
         let of_features = of_features.filter(|(_, class)| first_class <= usize::from(**class));
         let of_features = of_features.map(|(triangle, _)| square.corners(triangle)).collect();
-        Self { square, of_features, aside }
+        let decks = &module.decks;
+        let of_deck = |triangle: &[u16; 3]| {
+            let corners = triangle.map(|corner| decks.vertices[usize::from(corner)]);
+            let heights = corners.map(|corner| corner.z);
+            let [low, high] = [heights.into_iter().min(), heights.into_iter().max()].map(Option::unwrap_or_default);
+            (corners.map(|corner| square.at(corner.y, corner.x)), [low, high])
+        };
+        let of_decks = decks.triangles.iter().map(of_deck).collect();
+        Self { square, of_features, of_decks, aside }
     }
 
-    /// Parts of the line between two places, from 0 to 1, along which neither an edge nor a feature's triangle lies.
-    fn bare(&self, a: At, b: At) -> Vec<(f64, f64)> {
+    /// Parts of the line between two places with their heights, from 0 to 1, along which neither an edge nor a triangle
+    /// of features lies, nor a deck as high as the line.
+    fn bare(&self, [a, b]: [At; 2], heights: [i32; 2]) -> Vec<(f64, f64)> {
         let line = Along::of(a, b);
         let edges = self.square.edges.iter().filter_map(|ends| line.beside(*ends, self.aside));
         // Corners of strips are rounded as lines are.
         let asides = [-self.aside, 0.0, self.aside];
         let within = |corners: &[At; 3]| asides.map(|aside| line.within(*corners, aside)).into_iter().flatten();
-        line.bare(edges.chain(self.of_features.iter().flat_map(within)).collect())
+        let [low, high] = [heights[0].min(heights[1]), heights[0].max(heights[1])];
+        let is_as_high = |[lowest, highest]: [i32; 2]| lowest - DECK_OFF < high && low < highest + DECK_OFF;
+        let decks = self.of_decks.iter().filter(|(_, heights)| is_as_high(*heights)).map(|(corners, _)| corners);
+        line.bare(edges.chain(self.of_features.iter().chain(decks).flat_map(within)).collect())
     }
 }
 
