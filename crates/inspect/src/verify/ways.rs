@@ -260,6 +260,7 @@ impl Along {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use terrain::{Decks, ModuleId, ModuleResidual, ModuleVertex, Objects};
 
     #[test]
     fn triangles_of_a_strip_leave_nothing_of_its_middle_line_bare() {
@@ -275,5 +276,25 @@ mod tests {
             assert_eq!(line.bare(there), [], "{corners:?}");
         }
         assert_eq!(line.bare(vec![(0.1, 0.5), (0.4, 0.9)]), [(0.0, 0.1), (0.9, 1.0)]);
+    }
+
+    #[test]
+    fn a_deck_stands_for_ground_only_where_it_is_as_high_as_the_line() {
+        let vertex = |y, x, z| ModuleVertex { y, x, z };
+        let corners = |z| vec![vertex(0, 0, z), vertex(0, 6400, z), vertex(6400, 6400, z)];
+        let module = |deck| LoadModule {
+            id: ModuleId { row: 0, col: 0 },
+            side: 6400,
+            vertices: corners(0),
+            triangles: vec![[0, 1, 2]],
+            classes: vec![0],
+            polygon_count: 1,
+            residual: ModuleResidual::default(),
+            decks: Decks { vertices: corners(deck), triangles: vec![[0, 1, 2]], classes: vec![2] },
+            lines: Vec::new(),
+            objects: Objects::default(),
+        };
+        let bare = |deck| Ground::of(&module(deck), 1, 8.0).bare([(1000, 3000), (1000, 5000)], [0, 64]).len();
+        assert_eq!([bare(0), bare(128), bare(64 + 128), bare(900), bare(-128)], [0, 0, 1, 1, 1]);
     }
 }
