@@ -14,7 +14,7 @@ use crate::exact::Segment;
 use crate::inside::{Inside, LINES_AT_ONCE};
 use crate::middles::{Middle, middles};
 use crate::pieces::{Piece, pieces};
-use crate::room::{Changed, Sharing, by_corners, remark_rooms};
+use crate::room::{Sharing, Squares, by_corners, remark_rooms};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
 use crate::strips::{Face, Room, Wide, has_room};
@@ -158,11 +158,18 @@ impl Forming<'_> {
         lines.extend(centrelines(graded.network, pieces, wide, graded.heights));
         lines.extend(self.thinned.iter().cloned());
         if scope == Scope::NearChanged {
-            let changed = Changed::between(&before, &faces, site.lattice);
-            faces.retain(|face| changed.is_around(&face.corners));
-            lines.retain(|line| line.stations.windows(2).any(|ends| changed.is_around(ends)));
             lines.extend(outlines(&faces));
-            faces.retain(|face| changed.is_at(&face.corners));
+            // What changed bends lines that reach it, and they may tilt strips where they lead to; those are judged
+            // right beside all that they meet.
+            let reach = |squares: &Squares| {
+                let edges = lines.iter().flat_map(|line| line.stations.windows(2));
+                Squares::around(edges.filter(|ends| squares.have(ends)), site.lattice)
+            };
+            let bent = reach(&Squares::of_changed(&before, &faces, site.lattice));
+            faces.retain(|face| bent.have(&face.corners));
+            let judged = Squares::around(faces.iter().map(|face| &face.corners[..]), site.lattice);
+            let met = reach(&judged);
+            lines.retain(|line| line.stations.windows(2).any(|ends| met.have(ends)));
         } else {
             lines.extend(outlines(&faces));
         }
@@ -438,8 +445,9 @@ fn heights_along(line: &Strand, places: &[Place]) -> Vec<i32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::samples::{formed, site, way};
+    use crate::samples::{formed, formed_between, rounded, site, way};
     use proptest::prelude::*;
+    use proptest::strategy::ValueTree;
 
     #[test]
     fn a_bench_meets_the_ground_beyond_both_of_its_edges() {
@@ -608,17 +616,32 @@ mod tests {
         lines.iter().enumerate().map(way_of).collect()
     }
 
+    fn drawn() -> impl Strategy<Value = Vec<Drawn>> {
+        proptest::collection::vec((0usize..7, proptest::collection::vec((40..160i32, 40..160i32), 2..5)), 1..10)
+    }
+
+    fn bowl(east: f64, north: f64) -> f64 {
+        0.4 * north + 0.03 * (east - 20.0) * (east - 20.0)
+    }
+
+    #[test]
+    fn a_strip_that_gives_way_changes_only_what_is_near_it() {
+        let mut runner = proptest::test_runner::TestRunner::deterministic();
+        for _ in 0..300 {
+            let lines = drawn().new_tree(&mut runner).unwrap().current();
+            let [near, whole] = [Scope::NearChanged, Scope::Whole]
+                .map(|between| formed_between(rounded(network_of(&lines)), bowl, between));
+            assert_eq!(near, whole, "{lines:?}");
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(150))]
         #[test]
-        fn whatever_the_network_edges_touch_at_points_only_in_any_order_of_features(
-            lines in proptest::collection::vec(
-                (0usize..7, proptest::collection::vec((40..160i32, 40..160i32), 2..5)), 1..10)
-        ) {
-            let ground = |east: f64, north: f64| 0.4 * north + 0.03 * (east - 20.0) * (east - 20.0);
+        fn whatever_the_network_edges_touch_at_points_only_in_any_order_of_features(lines in drawn()) {
             let sources = network_of(&lines);
-            let there = formed(sources.clone(), ground);
-            let back = formed(sources.into_iter().rev().collect(), ground);
+            let there = formed(sources.clone(), bowl);
+            let back = formed(sources.into_iter().rev().collect(), bowl);
             prop_assert_eq!(there, back);
         }
     }

@@ -72,52 +72,45 @@ pub(crate) fn by_corners(a: &Face, b: &Face) -> Ordering {
     (a.class, &a.corners).cmp(&(b.class, &b.corners))
 }
 
-/// Where faces changed, as squares of the plane.
-pub(crate) struct Changed {
+/// Squares of the plane that some boxes touch.
+pub(crate) struct Squares {
     /// Steps of a square's side.
     side: i32,
-    /// Squares in which faces changed, and those next to them.
-    at: HashSet<[i32; 2]>,
-    /// Those and the next ones.
-    around: HashSet<[i32; 2]>,
+    touched: HashSet<[i32; 2]>,
 }
 
-impl Changed {
+impl Squares {
     /// Metres of a square's side: farther than rounding and heights at shared places reach.
     const SIDE_M: f64 = 64.0;
 
-    /// Where faces differ from those before, all in the order of [`by_corners`].
-    pub fn between(before: &[Face], after: &[Face], lattice: FeatureLattice) -> Self {
+    /// The squares that the boxes of `corners` touch, and those next to them.
+    pub fn around<'a>(boxes: impl Iterator<Item = &'a [(Place, i32)]>, lattice: FeatureLattice) -> Self {
         let side = lattice.steps_in(Self::SIDE_M).max(1) as i32;
-        let mut changed = Self { side, at: HashSet::new(), around: HashSet::new() };
-        for (faces, others) in [(before, after), (after, before)] {
-            for face in faces.iter().filter(|face| others.binary_search_by(|other| by_corners(other, face)).is_err()) {
-                changed.at.extend(changed.squares(&face.corners, 1));
-                changed.around.extend(changed.squares(&face.corners, 2));
-            }
-        }
-        changed
+        Self { side, touched: boxes.flat_map(|corners| squares(corners, side, 1)).collect() }
     }
 
-    /// Whether the box of some places is where faces changed or next to it.
-    pub fn is_at(&self, places: &[(Place, i32)]) -> bool {
-        self.squares(places, 0).any(|square| self.at.contains(&square))
+    /// Where faces differ from those before, all in the order of [`by_corners`].
+    pub fn of_changed(before: &[Face], after: &[Face], lattice: FeatureLattice) -> Self {
+        let changed = [(before, after), (after, before)].into_iter().flat_map(|(faces, others)| {
+            faces.iter().filter(|face| others.binary_search_by(|other| by_corners(other, face)).is_err())
+        });
+        Self::around(changed.map(|face| &face.corners[..]), lattice)
     }
 
-    /// The same, farther away.
-    pub fn is_around(&self, places: &[(Place, i32)]) -> bool {
-        self.squares(places, 0).any(|square| self.around.contains(&square))
+    /// Whether the box of some places touches one of them.
+    pub fn have(&self, places: &[(Place, i32)]) -> bool {
+        squares(places, self.side, 0).any(|square| self.touched.contains(&square))
     }
+}
 
-    /// The squares of the box of some places, and `more` on each side.
-    fn squares(&self, places: &[(Place, i32)], more: i32) -> impl Iterator<Item = [i32; 2]> + use<> {
-        let span = |of: fn(&(Place, i32)) -> i32| {
-            let low = places.iter().map(of).min().map_or(0, |low| low.div_euclid(self.side) - more);
-            low..places.iter().map(of).max().map_or(low, |high| high.div_euclid(self.side) + more + 1)
-        };
-        let (rows, cols) = (span(|(place, _)| place.row), span(|(place, _)| place.col));
-        rows.flat_map(move |row| cols.clone().map(move |col| [row, col]))
-    }
+/// The squares of the box of some places, and `more` on each side.
+fn squares(places: &[(Place, i32)], side: i32, more: i32) -> impl Iterator<Item = [i32; 2]> + use<> {
+    let span = |of: fn(&(Place, i32)) -> i32| {
+        let low = places.iter().map(of).min().map_or(0, |low| low.div_euclid(side) - more);
+        low..places.iter().map(of).max().map_or(low, |high| high.div_euclid(side) + more + 1)
+    };
+    let (rows, cols) = (span(|(place, _)| place.row), span(|(place, _)| place.col));
+    rows.flat_map(move |row| cols.clone().map(move |col| [row, col]))
 }
 
 /// Writes down which strips others left less room than they ask for.
