@@ -25,6 +25,10 @@ use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy
 /// A line inside a strip is worth a remark from this length on, in quanta: below it, it only ends at the strip's edge.
 const CUT_LENGTH_MIN: i64 = 30 * 128;
 
+/// A side of a strip may rise by so many quanta more than the grade of its centreline lets it: the inner sides of bends
+/// do, and what rounding moves.
+const SIDE_BEYOND_MAX: i32 = 32;
+
 /// An edge the TIN has to keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FormedEdge {
@@ -113,7 +117,7 @@ pub(crate) fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each,
             let mut notes = Notes { id: lake.id, lattice: site.lattice, remarks: &mut remarks };
             notes.write_at(place, Flaw::LevelsDisagree, Remedy::Levelled);
         }
-        tilted.into_iter().for_each(|number| forming.sharing.narrow(number, Room::None));
+        tilted.into_iter().for_each(|(number, room)| forming.sharing.narrow(number, room));
         formed = forming.round_together(scope).0;
     }
     let Forming { sharing, thinned, .. } = forming;
@@ -221,26 +225,46 @@ fn lower(strands: &mut [Strand], lake: &Uneven) {
     }
 }
 
-/// Strips that another line would tilt, or that would make one too steep: those of which a corner has the height of a
-/// line that passes through it, and those at the side of which a line begins that is steeper than it may be.
-fn tilted(formed: &Formed, network: &Network, sharing: &Sharing) -> BTreeSet<u32> {
+/// Strips that another line would tilt, or that would make one too steep, each with the room it is left: those of which
+/// a corner has the height of a line that passes through it, those at the side of which a line begins that is steeper
+/// than it may be, and those that have such a side, because another line touches it: half the width may part the two.
+fn tilted(formed: &Formed, network: &Network, sharing: &Sharing) -> BTreeMap<u32, Room> {
     let grades: HashMap<FeatureId, u32> =
         network.ways.iter().map(|way| (way.id, way.traits.grade_most_ppm())).collect();
-    let mut steep: HashSet<Place> = HashSet::new();
-    for edge in formed.edges.iter().filter(|edge| edge.role == Role::Centre) {
+    let (mut steep, mut sides): (HashSet<Place>, HashMap<FeatureId, Vec<[Place; 2]>>) = Default::default();
+    for edge in formed.edges.iter().filter(|edge| matches!(edge.role, Role::Centre | Role::Side)) {
         let [a, b] = [edge.a, edge.b].map(|point| formed.points[point as usize]);
         let grade_ppm = grades.get(&edge.id).copied().unwrap_or(0);
-        if 0 < grade_ppm && network.lattice.rise_max(a.0, b.0, grade_ppm, 0) + 1 < (a.1 - b.1).abs() {
+        let beyond = (a.1 - b.1).abs() - network.lattice.rise_max(a.0, b.0, grade_ppm, 0);
+        if 0 < grade_ppm && edge.role == Role::Centre && 1 < beyond {
             steep.extend([a.0, b.0]);
+        } else if 0 < grade_ppm && edge.role == Role::Side && SIDE_BEYOND_MAX < beyond {
+            sides.entry(edge.id).or_default().push([a.0, b.0]);
         }
     }
     let has_other_height = |&(place, height): &(Place, i32)| {
         let found = formed.points.binary_search_by_key(&place, |(other, _)| *other);
         found.is_ok_and(|found| formed.points[found].1 != height)
     };
-    let is_beside_steep = |face: &Face| steep.iter().any(|place| is_on_outline(face, *place));
-    let strips = formed.faces.iter().filter(|face| face.corners.iter().any(has_other_height) || is_beside_steep(face));
-    strips.flat_map(|face| sharing.at_nodes.wide_of(face, &sharing.wide)).collect()
+    let is_beside = |face: &Face, place: &Place| is_on_outline(face, *place);
+    let gives_way =
+        |face: &Face| face.corners.iter().any(has_other_height) || steep.iter().any(|place| is_beside(face, place));
+    let has_steep_side = |face: &Face| {
+        let sides = sides.get(&face.id).into_iter().flatten();
+        sides.into_iter().any(|ends| ends.iter().all(|place| is_beside(face, place)))
+    };
+    let mut rooms = BTreeMap::new();
+    for face in &formed.faces {
+        let wide = || sharing.at_nodes.wide_of(face, &sharing.wide);
+        if gives_way(face) {
+            rooms.extend(wide().into_iter().map(|number| (number, Room::None)));
+        } else if has_steep_side(face) {
+            for number in wide() {
+                rooms.entry(number).or_insert(sharing.wide[number as usize].room.less());
+            }
+        }
+    }
+    rooms
 }
 
 /// Whether a place lies within a step of the outline of a face.
@@ -500,6 +524,31 @@ mod tests {
         }
     }
 
+    /// No side of a strip rises by much more than the grade of its way, whatever touches it.
+    #[track_caller]
+    fn check_sides(formed: &Formed, ways: &[crate::Way]) {
+        for edge in formed.edges.iter().filter(|edge| edge.role == Role::Side) {
+            let [a, b] = [edge.a, edge.b].map(|point| formed.points[point as usize]);
+            let of = ways.iter().filter(|way| way.id == edge.id).map(|way| way.traits.grade_most_ppm());
+            let rise_max = site().lattice.rise_max(a.0, b.0, of.max().unwrap(), 0);
+            assert!((a.1 - b.1).abs() <= rise_max + SIDE_BEYOND_MAX, "{a:?} {b:?} {:?}", edge.id);
+        }
+    }
+
+    #[test]
+    fn sides_of_two_widths_meet_square_to_the_road_and_inner_sides_of_bends_keep_its_grade() {
+        let sources = vec![
+            way(1, "highway=primary width=14", &[(10.0, 10.0), (30.0, 10.0)]),
+            way(2, "highway=primary width=7", &[(30.0, 10.0), (50.0, 11.2), (52.0, 9.0), (54.0, 11.0), (70.0, 11.0)]),
+        ];
+        let formed = formed(sources.clone(), |east, _| 3.0 * east);
+        check_level_across(&formed);
+        check_sides(&formed, &rounded(sources).ways);
+        let across = |face: &Face| site().lattice.length(face.corners[1].0, face.corners[2].0);
+        let meeting = formed.faces.iter().filter(|face| face.id.number == 1).map(across).last();
+        assert!(meeting.is_some_and(|across| across < 12 * 128), "{meeting:?}");
+    }
+
     #[test]
     fn a_road_is_a_strip_over_its_whole_length_level_across_whatever_the_ground() {
         let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
@@ -641,6 +690,7 @@ mod tests {
         fn whatever_the_network_edges_touch_at_points_only_in_any_order_of_features(lines in drawn()) {
             let sources = network_of(&lines);
             let there = formed(sources.clone(), bowl);
+            check_sides(&there, &rounded(sources.clone()).ways);
             let back = formed(sources.into_iter().rev().collect(), bowl);
             prop_assert_eq!(there, back);
         }

@@ -7,9 +7,6 @@ use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::{FeatureId, FeatureLattice, Flaw, Form, Place, Remark, Remedy, Storey, Traits, Way};
 
-/// Cosine between two edges below which a way goes on nearly straight: a turn of less than 60 degrees.
-const STRAIGHT: f64 = -0.5;
-
 /// A station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Node {
@@ -115,8 +112,9 @@ impl Network {
         network
     }
 
-    /// Quanta of an edge that are level at one of its ends: where three and more meet on the ground, or where it turns
-    /// off sharply, as far as it runs inside the widest other that may be a strip, which is level across.
+    /// Quanta of an edge that are level at one of its ends, as far as it runs inside the widest other that may be a
+    /// strip, which is level across: where three and more meet on the ground, where it turns off sharply, and what its
+    /// inner side lacks in a bend.
     pub fn flat_at(&self, node: u32, edge: u32) -> i32 {
         let meets = self.beside(node);
         if meets.len() < 2 || !self.nodes[node as usize].on_ground {
@@ -138,8 +136,8 @@ impl Network {
             let sine = ((one[0] * other[1] - one[1] * other[0]) / lengths).abs();
             let half = f64::from(traits.width) / 2.0;
             match cosine {
-                // Nearly straight on, and no third one: the strip goes on as this edge does.
-                ..STRAIGHT if meets.len() == 2 => 0.0,
+                // The strip goes on as this edge does: in a bend its inner side is shorter.
+                ..0.0 if meets.len() == 2 => half * sine / (1.0 - cosine),
                 ..0.0 => half,
                 _ => half / sine.max(0.25),
             }

@@ -59,7 +59,7 @@ impl<'a> Sharing<'a> {
             }
             for loser in losers {
                 let had = self.wide[loser as usize].room;
-                self.narrow(loser, if had == Room::Whole { Room::Half } else { Room::None });
+                self.narrow(loser, had.less());
             }
             found = self.faces();
         }

@@ -19,12 +19,23 @@ const ALONG_SHARE_MAX: f64 = 0.49;
 /// Arms whose directions differ from straight on by less than this (as a cross product of units) have one side.
 const STRAIGHT_MAX: f64 = 0.02;
 
+/// Arms that lead apart by more than 135 degrees (as a dot product of units) are one road, and a corner between them
+/// lies at their mean width: sides of two widths meet far along it, and the road would be level along itself.
+const ONWARD_MAX: f64 = -0.7;
+
 /// How wide a segment is, after others of higher class took their room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) enum Room {
     Whole,
     Half,
     None,
+}
+
+impl Room {
+    /// The next less.
+    pub fn less(self) -> Self {
+        if self == Self::Whole { Self::Half } else { Self::None }
+    }
 }
 
 /// A segment of a piece that is a strip.
@@ -199,10 +210,14 @@ fn beside(place: Place, arm: &Arm, sign: f64) -> Place {
 
 /// The corner between an arm and the next one counter-clockwise: where the left side of the one meets the right side
 /// of the other, no farther away than a mitre may reach and no farther along than half of either arm.
-fn corner(place: Place, arm: Arm, next: Arm) -> Place {
+fn corner(place: Place, mut arm: Arm, mut next: Arm) -> Place {
     let (u, v) = (arm.unit, next.unit);
     let cross = u[0] * v[1] - u[1] * v[0];
     let dot = u[0] * v[0] + u[1] * v[1];
+    if dot < ONWARD_MAX {
+        let mean = (arm.half + next.half) / 2.0;
+        (arm.half, next.half) = (mean, mean);
+    }
     let (left, right) = ([-arm.half * u[1], arm.half * u[0]], [next.half * v[1], -next.half * v[0]]);
     let straight = cross.abs() < STRAIGHT_MAX && dot < 0.0;
     let [mut east, mut north] = if straight {
