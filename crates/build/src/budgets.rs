@@ -9,7 +9,7 @@ use crate::ground::{GamingArea, Ground};
 use features::objects::Plan;
 use features::{AreaFeatures, Formed, Kind, Levelled};
 use job::Job;
-use schedule::{Workers, for_each_piece};
+use schedule::Workers;
 use store::Profile;
 use terrain::{LineStorey, TileId};
 
@@ -91,8 +91,7 @@ impl Budgets {
     pub fn open(job: &Job, workers: usize) -> Result<Option<Self>, CompileError> {
         let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
         let area = GamingArea::new(job)?;
-        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
-        let Some(read) = ReadFeatures::open(job, &area, &each)? else { return Ok(None) };
+        let Some(read) = ReadFeatures::open(job, &area, &workers.each())? else { return Ok(None) };
         let source = Ground::open(job, &area, &workers, &stop)?;
         let sounded = |&tile| Ok(sound(&area, &read, tile, &source.natural_tile(&area, tile)?.dem));
         let profiles: Vec<Profile> = area.tiles.iter().map(sounded).collect::<Result<_, CompileError>>()?;
@@ -117,7 +116,7 @@ impl Budgets {
         let area = GamingArea::new(&job)?;
         let spec = job.features.as_ref().expect("a job with features");
         let (sounded, shares) = (self.heard.sounded(), shares(&area.budget, spec));
-        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&self.workers, count, piece);
+        let each = self.workers.each();
         let Levelled { reserved, .. } = self.read.features.level(sounded, (spec.options, spec.falls), &shares, &each);
         let lakes = reserved.amounts.values();
         let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);

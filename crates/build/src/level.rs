@@ -3,7 +3,6 @@
 
 use features::{Share, Shares, Sounded};
 use job::FeaturesSpec;
-use schedule::for_each_piece;
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use store::{AreaLevel, FileStamp, Profile};
 use terrain::TileId;
@@ -71,8 +70,7 @@ impl Artifact for Levelling<'_> {
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaLevel), CompileError> {
         let Self { run, read, spec, sounded } = *self;
         let shares = shares(&run.area.budget, spec);
-        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&run.workers, count, piece);
-        let levelled = read.features.level(sounded, (spec.options, spec.falls), &shares, &each);
+        let levelled = read.features.level(sounded, (spec.options, spec.falls), &shares, &run.workers.each());
         let pieces = pieces(run, &read.features, &levelled);
         let mut level = area_level(run, read, &levelled);
         level.reserved = reserved(run, &levelled.reserved.formed, &pieces);

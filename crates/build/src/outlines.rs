@@ -3,7 +3,7 @@
 
 use features::objects::{Claims, Full, Granted, ObjectLimits, ObjectRemark, ObjectTally, Plan, Wanting, mended};
 use job::{Job, ObjectsSpec};
-use schedule::{Workers, for_each_piece};
+use schedule::Workers;
 use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
 use store::{
     AreaOutlines, FeatureRemark, FileStamp, ModuleOutlines, ObjectLeftOut, ObjectSums, ReportObjectLimit,
@@ -68,8 +68,8 @@ impl Artifact for Outlining<'_> {
     }
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(FileStamp, AreaOutlines), CompileError> {
-        let each: Each = &|count, piece| for_each_piece(&self.run.workers, count, piece);
-        let outlines = outlines_of(self.run.job, (self.spec, &self.free, &self.limits), &self.run.area, each)?;
+        let each = self.run.workers.each();
+        let outlines = outlines_of(self.run.job, (self.spec, &self.free, &self.limits), &self.run.area, &each)?;
         Ok((self.run.database.write_outlines(stamp, &outlines)?, outlines))
     }
 }
@@ -111,8 +111,7 @@ impl ObjectBudgets {
     pub fn open(job: &Job, features: Option<&Budgets>, workers: usize) -> Result<Option<Self>, CompileError> {
         let Some(spec) = &job.objects else { return Ok(None) };
         let (workers, area) = (Workers::new(workers), GamingArea::new(job)?);
-        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(&workers, count, piece);
-        let found = FoundObjects::read(job, spec, &area, &each)?;
+        let found = FoundObjects::read(job, spec, &area, &workers.each())?;
         let free = features.map_or_else(Vec::new, Budgets::covered);
         let outlines = mended(found.objects, &spec.options).0;
         let limits = limits_of(spec, &area.budget);

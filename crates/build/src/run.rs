@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::ground::{GamingArea, Ground, Window};
 use job::{Budget as PointBudget, Edges, Job};
-use schedule::{Event as Scheduled, RankedTasks, Workers, for_each_piece, in_rank_order_observed};
+use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed};
 use source_files::FileState;
 use store::engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use store::{AreaLevel, AreaOutlines, Database, FileStamp, Manifest, RUN_DIGITS, SourceRecord};
@@ -140,9 +140,8 @@ impl Run<'_> {
         if let Some(read) = self.read.get() {
             return Ok(read.clone());
         }
-        let read =
-            ReadFeatures::open(self.job, &self.area, &|count, piece| for_each_piece(&self.workers, count, piece))?
-                .expect("a stage of jobs with features");
+        let read = ReadFeatures::open(self.job, &self.area, &self.workers.each())?;
+        let read = read.expect("a stage of jobs with features");
         Ok(self.read.get_or_init(|| Arc::new(read)).clone())
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, IntoParallelRefIterator, ParallelIterator};
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefIterator, ParallelIterator};
 
 use crate::attempt::{Attempt, Outcome, attempt};
 use crate::{ScheduleError, Workers};
@@ -47,18 +47,6 @@ pub fn for_each_independent<T: Sync, R: Send, E: Send>(
     outcome.into_results()
 }
 
-/// Runs `piece(0)` to `piece(count - 1)`, in any order, on the workers; returns when all have ended.
-///
-/// For small pieces within a task: a panic goes on to the caller, and nothing stops the rest. Without threads to be had
-/// the pieces run on the calling one.
-pub fn for_each_piece(workers: &Workers, count: usize, piece: &(dyn Fn(usize) + Sync)) {
-    let is_shared = 1 < workers.count() && 1 < count;
-    match is_shared.then(|| workers.pool()) {
-        Some(Ok(pool)) => pool.install(|| (0..count).into_par_iter().with_max_len(1).for_each(piece)),
-        _ => (0..count).for_each(piece),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -84,7 +72,7 @@ mod tests {
     fn every_piece_runs_once_for_any_number_of_workers() {
         for count in [1, 2, 8] {
             let runs: Vec<AtomicUsize> = (0..100).map(|_| AtomicUsize::new(0)).collect();
-            for_each_piece(&Workers::new(count), runs.len(), &|number| {
+            Workers::new(count).each()(runs.len(), &|number| {
                 runs[number].fetch_add(1, Ordering::Relaxed);
             });
             assert!(runs.iter().all(|runs| runs.load(Ordering::Relaxed) == 1));

@@ -18,7 +18,7 @@ mod ranked;
 mod ready;
 pub use ranked::{Event, in_rank_order, in_rank_order_observed};
 mod independent;
-pub use independent::{for_each_independent, for_each_piece};
+pub use independent::for_each_independent;
 mod heartbeat;
 pub use heartbeat::with_heartbeat;
 mod simulate;

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+
 /// A number of workers. One worker is the calling thread itself; nothing is spawned for it.
 #[derive(Debug)]
 pub struct Workers {
@@ -23,6 +25,20 @@ impl Workers {
     /// How many there are.
     pub fn count(&self) -> usize {
         self.count
+    }
+
+    /// Runs `piece(0)` to `piece(count - 1)`, in any order, on the workers; returns when all have ended.
+    ///
+    /// For small pieces within a task: a panic goes on to the caller, and nothing stops the rest. Without threads to be
+    /// had the pieces run on the calling one.
+    pub fn each(&self) -> impl Fn(usize, &(dyn Fn(usize) + Sync)) + Sync + '_ {
+        move |count, piece| {
+            let is_shared = 1 < self.count && 1 < count;
+            match is_shared.then(|| self.pool()) {
+                Some(Ok(pool)) => pool.install(|| (0..count).into_par_iter().with_max_len(1).for_each(piece)),
+                _ => (0..count).for_each(piece),
+            }
+        }
     }
 
     /// The pool for independent items, or why the system gave no threads for it.

@@ -67,6 +67,8 @@ pub struct FeaturesSeen {
     pub objects: Vec<(&'static str, usize)>,
     /// How many inside are neither.
     pub without_kind: usize,
+    /// Of these, coastlines, which say where the sea is and enclose nothing.
+    pub coastlines: usize,
     /// Whether all inside are polygons, or all are lines; `None` where there are both, or none.
     pub are_polygons: Option<bool>,
     /// What a person should know.
@@ -136,6 +138,7 @@ pub fn features_in(
     let others: Vec<Source> = others.map(source_of).collect();
     let sources: Vec<Source> = read.features.iter().map(source_of).collect();
     let without_kind = overview_of(&others, &[]).unmatched.values().sum();
+    let coastlines = read.features.iter().filter(|feature| feature.tag("natural") == Some("coastline")).count();
     let overview = overview_of(&sources, &[]);
     let mut kinds: BTreeMap<Kind, usize> = BTreeMap::new();
     for row in overview.rows.iter().filter(|row| 0 < row.count) {
@@ -147,6 +150,7 @@ pub fn features_in(
         kinds: kinds.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
         objects: objects.into_iter().map(|(kind, count)| (kind.name(), count)).collect(),
         without_kind,
+        coastlines,
         are_polygons,
         notes: read.notes,
     })

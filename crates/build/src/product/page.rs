@@ -1,7 +1,7 @@
 //! `report.html`, drawn from what a build left: by the build itself, and on request later.
 
 use job::{Job, Setting};
-use schedule::{Workers, for_each_piece};
+use schedule::Workers;
 use store::{Manifest, Report, seal_page};
 use views::{Page, PageSetting, Scene, report_html};
 
@@ -26,6 +26,5 @@ fn drawn(job: &Job, manifest: &Manifest, report: &Report, scene: Option<&Scene>,
     let setting = |Setting { key, value, meaning, .. }| PageSetting { key: key.to_owned(), value, meaning };
     let settings: Vec<PageSetting> = job.describe().into_iter().map(setting).collect();
     let title = job.area.title.as_deref();
-    let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| for_each_piece(workers, count, piece);
-    seal_page(&report_html(&Page { title, report, manifest, settings: &settings, scene }, &each))
+    seal_page(&report_html(&Page { title, report, manifest, settings: &settings, scene }, &workers.each()))
 }

@@ -131,8 +131,7 @@ impl Heights {
     pub fn mesh(&self, tin: Tin, ended: StopReason, workers: usize, stop: &AtomicBool) -> Result<Mesh, CompileError> {
         let workers = Workers::new(workers);
         let tally = tally_on_all(&self.dem, &tin, &workers, stop)?;
-        let each = |count: usize, piece: &(dyn Fn(usize) + Sync)| schedule::for_each_piece(&workers, count, piece);
-        let limit = fidelity::limit(&self.dem, tin.triangles.len(), &each);
+        let limit = fidelity::limit(&self.dem, tin.triangles.len(), &workers.each());
         // Residuals are those of all that is known, also at the rims of voids.
         let tin = without_voids(tin, &self.dem);
         Ok(Mesh {

@@ -109,7 +109,8 @@ mod tests {
     #[track_caller]
     fn check(file: &str, layer: Option<&str>, are_polygons: Option<bool>, expected: Option<&str>) {
         let (found, kinds, notes) = (1, Vec::new(), Vec::new());
-        let seen = FeaturesSeen { found, outside: 0, kinds, objects: Vec::new(), without_kind: 1, are_polygons, notes };
+        let (objects, coastlines) = (Vec::new(), 0);
+        let seen = FeaturesSeen { found, outside: 0, kinds, objects, without_kind: 1, coastlines, are_polygons, notes };
         assert_eq!(kind_by_name(Path::new(file), layer, &seen), expected);
     }
 

@@ -43,6 +43,13 @@ fn found_of(SeenFeatures { seen, kind_by_name, object_by_name, .. }: &SeenFeatur
     if !kinds.is_empty() {
         text += &format!(": {}", kinds.join(", "));
     }
+    if 0 < seen.coastlines {
+        text += &format!(
+            "; {} are coastlines: the sea is ground like any other, unless a polygon of it is a source with kind = \
+             \"lake\"",
+            grouped(seen.coastlines as u64)
+        );
+    }
     text
 }
 

@@ -8,7 +8,7 @@ use exports::{ByteRaster, write_byte_raster};
 use load_module_reader::{
     Area, Curvature, Eye, Hider, LoadedGround, Look, PastObjects, SEEN, Sight, Standing, TerrainModule, Viewshed,
 };
-use schedule::{Workers, for_each_piece};
+use schedule::Workers;
 use terrain::Spacing;
 use views::{SeenGround, draw_seen, fold, grouped};
 
@@ -246,7 +246,7 @@ impl Looks<'_> {
     fn rows(&self, first: usize, last: usize, count: &mut Count) -> Vec<Look> {
         let pieces = (last + 1 - first).div_ceil(ROWS_AT_ONCE);
         let found = Mutex::new(vec![Vec::new(); pieces]);
-        for_each_piece(&self.workers, pieces, &|piece| {
+        self.workers.each()(pieces, &|piece| {
             let start = first + piece * ROWS_AT_ONCE;
             let rows = start..=(start + ROWS_AT_ONCE - 1).min(last);
             let mut eye = self.eye.clone();
