@@ -106,18 +106,19 @@ pub(crate) fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each,
     // changes only what is near it, and only that is looked at until none does; the last round is one of all again.
     let mut scope = Scope::Whole;
     loop {
-        let tilted = tilted(&formed, network, &forming.sharing);
+        let mut narrowed = tilted(&formed, network, &forming.sharing);
+        narrowed.extend(forming.sharing.alone().into_iter().map(|number| (number, Room::None)));
         let uneven = if scope == Scope::Whole { uneven(&formed) } else { BTreeMap::new() };
-        if tilted.is_empty() && uneven.is_empty() && scope == Scope::Whole {
+        if narrowed.is_empty() && uneven.is_empty() && scope == Scope::Whole {
             break;
         }
-        scope = if tilted.is_empty() || !uneven.is_empty() { Scope::Whole } else { between };
+        scope = if narrowed.is_empty() || !uneven.is_empty() { Scope::Whole } else { between };
         for (lake, place) in uneven {
             lower(&mut forming.thinned, &lake);
             let mut notes = Notes { id: lake.id, lattice: site.lattice, remarks: &mut remarks };
             notes.write_at(place, Flaw::LevelsDisagree, Remedy::Levelled);
         }
-        tilted.into_iter().for_each(|(number, room)| forming.sharing.narrow(number, room));
+        narrowed.into_iter().for_each(|(number, room)| forming.sharing.narrow(number, room));
         formed = forming.round_together(scope).0;
     }
     let Forming { sharing, thinned, .. } = forming;

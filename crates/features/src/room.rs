@@ -3,6 +3,8 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeSet, HashSet};
 
+use terrain::QUANTA_PER_METRE;
+
 use crate::clean::Notes;
 use crate::exact::Segment;
 use crate::pieces::Piece;
@@ -48,6 +50,36 @@ impl<'a> Sharing<'a> {
         faces(self.network, self.pieces, (&self.wide, &self.arms), self.heights)
     }
 
+    /// What is left of a strip between the lines that the rest of its way became: short, and it meets no other.
+    pub fn alone(&self) -> Vec<u32> {
+        let Self { network, wide, at_nodes, .. } = self;
+        let numbered: Vec<(u32, &Wide)> = (0..).zip(wide).collect();
+        let mut alone = Vec::new();
+        for of_piece in numbered.chunk_by(|(_, a), (_, b)| a.piece == b.piece) {
+            if of_piece.iter().all(|(_, of)| of.room != Room::None) {
+                continue;
+            }
+            let goes_on = |(_, a): &(u32, &Wide), (_, b): &(u32, &Wide)| {
+                a.segment + 1 == b.segment && (a.room == Room::None) == (b.room == Room::None)
+            };
+            for run in of_piece.chunk_by(goes_on).filter(|run| run[0].1.room != Room::None) {
+                let places = |of: &Wide| [of.a, of.b].map(|node| network.nodes[node as usize].place);
+                let length = |(_, of): &(u32, &Wide)| network.lattice.length(places(of)[0], places(of)[1]);
+                let (first, last) = (run[0], run[run.len() - 1]);
+                let meets = |node: u32, own: u32| {
+                    at_nodes.at(node).any(|number| number != own && wide[number as usize].room != Room::None)
+                };
+                if run.iter().map(length).sum::<i64>() <= ALONE_MAX
+                    && !meets(first.1.a, first.0)
+                    && !meets(last.1.b, last.0)
+                {
+                    alone.extend(run.iter().map(|(number, _)| *number));
+                }
+            }
+        }
+        alone
+    }
+
     /// The faces of all strips after overlaps are resolved.
     pub fn share_out(&mut self) -> Vec<Face> {
         let mut found = self.faces();
@@ -66,6 +98,9 @@ impl<'a> Sharing<'a> {
         found
     }
 }
+
+/// A strip of no more quanta that meets no other, on a way that is a line elsewhere, is a line there too: 50 m.
+const ALONE_MAX: i64 = 50 * QUANTA_PER_METRE as i64;
 
 /// The order of faces: by class, then by corners with their heights.
 pub(crate) fn by_corners(a: &Face, b: &Face) -> Ordering {
@@ -194,14 +229,16 @@ impl AtNodes {
         Self(all)
     }
 
+    /// The strip segments that end at a node.
+    fn at(&self, node: u32) -> impl Iterator<Item = u32> {
+        let first = self.0.partition_point(|(other, _)| *other < node);
+        self.0[first..].iter().take_while(move |(other, _)| *other == node).map(|(_, number)| *number)
+    }
+
     /// The strip segments that make a face: its own, or those that meet in a junction.
     pub fn wide_of(&self, face: &Face, wide: &[Wide]) -> Vec<u32> {
         let Some(own) = face.wide else {
-            let at = |node: &u32| {
-                let (first, node) = (self.0.partition_point(|(other, _)| other < node), *node);
-                self.0[first..].iter().take_while(move |(other, _)| *other == node).map(|(_, number)| *number)
-            };
-            let meets = face.nodes.iter().flat_map(at);
+            let meets = face.nodes.iter().flat_map(|node| self.at(*node));
             let mut numbers: Vec<u32> = meets.filter(|number| wide[*number as usize].room != Room::None).collect();
             numbers.sort_unstable();
             numbers.dedup();
@@ -244,6 +281,34 @@ mod tests {
             assert_eq!(at_nodes.wide_of(&face(nodes.clone(), None), &wide), all, "{nodes:?}");
         }
         assert_eq!(at_nodes.wide_of(&face(vec![0], Some(4)), &wide), [4]);
+    }
+
+    #[test]
+    fn what_is_left_of_a_strip_between_lines_is_alone_where_it_is_short_and_meets_no_other() {
+        let bends = [(10.0, 10.0), (20.0, 12.0), (23.0, 10.0), (33.0, 12.0), (36.0, 10.0)];
+        let check = |more: Option<crate::Source>, lines: &[u32], alone: &[u32]| {
+            let sources = [way(1, "highway=primary", &bends)].into_iter().chain(more).collect();
+            let (network, _, _) = network(sources, |_, _| 10.0);
+            let heights = vec![1280; network.nodes.len()];
+            let pieces = pieces(&network, &heights, &site(), &|_| false, &Grants::default());
+            let mut sharing = Sharing::of(&network, &pieces, &heights);
+            // Segments by their westernmost end.
+            let by_place = |number: &u32| {
+                let of = &sharing.wide[*number as usize];
+                [of.a, of.b].map(|node| network.nodes[node as usize].place.col).into_iter().min()
+            };
+            let mut numbers: Vec<u32> = (0..sharing.wide.len() as u32).collect();
+            numbers.sort_by_key(by_place);
+            lines.iter().for_each(|line| sharing.narrow(numbers[*line as usize], Room::None));
+            let found: Vec<u32> = alone.iter().map(|line| numbers[*line as usize]).collect();
+            assert_eq!(sharing.alone(), found, "{lines:?}");
+        };
+        check(None, &[], &[]);
+        check(None, &[0, 2], &[1, 3]);
+        check(None, &[0], &[]);
+        check(None, &[2], &[3]);
+        // Where the last one ends another strip begins.
+        check(Some(way(2, "highway=primary", &[(36.0, 10.0), (36.0, 40.0), (45.0, 45.0)])), &[2], &[]);
     }
 
     #[test]
