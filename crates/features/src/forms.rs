@@ -546,7 +546,7 @@ mod tests {
         check_level_across(&formed);
         check_sides(&formed, &rounded(sources).ways);
         let across = |face: &Face| site().lattice.length(face.corners[1].0, face.corners[2].0);
-        let meeting = formed.faces.iter().filter(|face| face.id.number == 1).map(across).last();
+        let meeting = formed.faces.iter().filter(|face| face.id.number == 1).map(across).next_back();
         assert!(meeting.is_some_and(|across| across < 12 * 128), "{meeting:?}");
     }
 
