@@ -26,8 +26,8 @@ def growth():
         scripts/bench.py growth --short            one decade of each, the least of three builds: a minute
 
     Features and objects are what a build with them takes more than the same build with as many triangles and none. The
-    last column is the cost of one over that of one a decade before; exit code 1 where it is above 1.3, or above 2 in the
-    short form, which runs beside other work: what grows with the square is ten times as much.
+    last column is the cost of one over that of one a decade before; exit code 1 where it is above 1.3. The short form
+    runs beside other work and allows 2: what grows with the square is ten times as much.
     """
     parser = parser_of(growth)
     parser.add_argument("--only", choices=SERIES, help="one of the series")
