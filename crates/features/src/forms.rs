@@ -25,8 +25,8 @@ use crate::{FeatureId, Flaw, Form, Grant, Grants, Network, Place, Remark, Remedy
 /// A line inside a strip is worth a remark from this length on, in quanta: below it, it only ends at the strip's edge.
 const CUT_LENGTH_MIN: i64 = 30 * 128;
 
-/// A side of a strip may rise by so many quanta more than the grade of its centreline lets it: the inner sides of bends
-/// do, and what rounding moves.
+/// A side of a strip may rise by so many quanta (0.25 m) more than the grade of its centreline lets it: the inner sides
+/// of bends do, and what rounding moves.
 const SIDE_BEYOND_MAX: i32 = 32;
 
 /// An edge the TIN has to keep.
