@@ -44,11 +44,8 @@ fn found_of(SeenFeatures { seen, kind_by_name, object_by_name, .. }: &SeenFeatur
         text += &format!(": {}", kinds.join(", "));
     }
     if 0 < seen.coastlines {
-        text += &format!(
-            "; {} are coastlines: the sea is ground like any other, unless a polygon of it is a source with kind = \
-             \"lake\"",
-            grouped(seen.coastlines as u64)
-        );
+        let count = grouped(seen.coastlines as u64);
+        text += &format!("; coastlines ({count}) make no sea: a polygon of it may be a source with kind = \"lake\"");
     }
     text
 }

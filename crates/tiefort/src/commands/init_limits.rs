@@ -127,6 +127,11 @@ fn sentence(chosen: &Budgeted, tried: &[Budgeted], is_asked: bool) -> String {
         }
     };
     let mean = chosen.mean;
+    if chosen.metres(|_| true)[1] == 0.0 && chosen.lakes[1] == 0 {
+        return format!(
+            "{mean} triangles a load module; no road or river of the files and no lake of 1 ha lies in the area"
+        );
+    }
     match tried.first().filter(|least| least.mean < mean && !is_asked) {
         Some(least) => format!("{mean} triangles a load module: {} would keep {}", least.mean, kept(least)),
         None => format!("{mean} triangles a load module keep {}", kept(chosen)),

@@ -31,7 +31,7 @@ const ROADS: [(&str, f64); 5] = [
     ("\"highway\":\"track\"", 0.0),
     ("\"highway\":\"track\",\"surface\":\"sand\"", 0.3),
     ("\"highway\":\"primary\",\"lanes\":\"2\"", -0.3),
-    ("\"highway\":\"footway\"", 0.1),
+    ("\"natural\":\"coastline\"", 0.1),
     ("\"highway\":\"track\"", 80.0),
 ];
 
@@ -74,7 +74,8 @@ fn init_writes_a_section_of_features_that_plan_reads() {
     let said = scene.run_to(0, &arguments);
     for part in [
         "found 1 file: 2 x 2 km at 25 m",
-        "roads.json: 4 of 5 lie in the area: 1 primary, 2 track, 1 of no kind, which are left out",
+        "roads.json: 4 of 5 lie in the area: 1 primary, 2 track, 1 of no kind, which are left out; \
+         coastlines (1) make no sea: a polygon of it may be a source with kind = \"lake\"",
         "water.gpkg, layer lakes: 1 of 2 lie in the area: no tag says what they are, the name says lake",
         "water.gpkg, layer none: no lines or polygons",
     ] {
