@@ -183,26 +183,15 @@ pub(crate) fn windows(
     origins.map(move |(row, col)| (ModuleId { row, col }, sum(row, col)))
 }
 
-/// The first triangle of each load module whose class is not that of most of the posts it holds, the smaller one where
-/// two have as many. One that holds none has the class of a post beside its centroid, and is not looked at.
-pub(crate) fn differing_classes(
-    modules: &[LoadModule],
+/// The class of most of the posts that a triangle holds, the smaller one where two have as many; `None` where it holds
+/// none: it then has the class of a post beside its centroid.
+pub(crate) fn class_of(
+    module: &LoadModule,
+    number: usize,
     mask: &Importance,
     grid: ModuleGrid,
     spacing: Spacing,
-) -> Vec<String> {
-    let differing = |module: &LoadModule| {
-        let number = (0..module.triangles.len()).find(|&number| {
-            let class = class_of(module, number, mask, grid, spacing);
-            class.is_some_and(|class| class != module.classes[number])
-        })?;
-        let (id, class) = (module.id, module.classes[number]);
-        Some(format!("load module {id}: triangle {number} has class {class}, the ground under it has another"))
-    };
-    modules.iter().filter_map(differing).collect()
-}
-
-fn class_of(module: &LoadModule, number: usize, mask: &Importance, grid: ModuleGrid, spacing: Spacing) -> Option<u8> {
+) -> Option<u8> {
     let mut counts = [0u32; 256];
     posts_in(module, number, grid, spacing, |post, _, _| counts[usize::from(mask.class(post))] += 1);
     let most = counts.iter().copied().max().filter(|&most| 0 < most)?;

@@ -1,6 +1,7 @@
 //! Re-reads a database and believes nothing it says: files, TINs, load modules, sides, identities, limits.
 
 mod beyond;
+mod classes;
 mod decided;
 mod deck;
 mod entries;
@@ -34,6 +35,7 @@ use terrain::{LoadModule, ModuleId, Side};
 
 use crate::recount;
 use beyond::{Around, Beyond};
+use classes::Classes;
 pub use features::NetworkFound;
 use modules::{Modules, at_level};
 
@@ -340,6 +342,7 @@ fn recompute(
             window.given.iter().filter_map(|given| given.height).chain([window.dem.range().0, window.dem.range().1]);
         bounds = bounds.map(|bounds| told.fold(bounds, Bounds::and));
         let features = ground.features(tile)?;
+        let natural = ground.natural_tile(area, tile)?;
         let around = Around::of(&ground, (&job, area), (&window, &features))?;
         for (level, modules) in levels.iter().enumerate() {
             let ids = area.tiling.modules(tile, area.grid);
@@ -351,7 +354,9 @@ fn recompute(
             }
             let mut of_level = differing_residuals(&own, modules, &window, area);
             if has_classes {
-                of_level.extend(recount::differing_classes(&own, &window.importance, area.grid, area.frame.spacing));
+                let (grid, spacing) = (area.grid, area.frame.spacing);
+                let classes = Classes::new(&job, &features, level, spacing);
+                of_level.extend(own.iter().filter_map(|own| classes.problem(own, &natural.importance, grid, spacing)));
             }
             problems.extend(of_level.into_iter().map(|problem| at_level(level, problem)));
         }

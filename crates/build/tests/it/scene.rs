@@ -171,7 +171,18 @@ impl Scene {
 
     #[track_caller]
     pub fn verify(&self, folder: &str) {
-        let verdict = inspect::verify(&self.path(folder), None).unwrap();
+        self.verify_against(folder, None);
+    }
+
+    /// The same with the raster that it was built from, in a scene that has one.
+    #[track_caller]
+    pub fn verify_on_dem(&self, folder: &str) {
+        self.verify_against(folder, Some(&self.path("dem.tif")));
+    }
+
+    #[track_caller]
+    fn verify_against(&self, folder: &str, dem: Option<&Path>) {
+        let verdict = inspect::verify(&self.path(folder), dem).unwrap();
         assert!(verdict.problems.is_empty(), "{}", verdict.problems.join("\n"));
     }
 }

@@ -90,7 +90,7 @@ impl Drawing {
     pub fn built(&self) -> Laid {
         let report = self.scene.build("area.tdb", 2).report;
         assert!(report.breaches.is_empty(), "{:?}", report.breaches);
-        self.scene.verify("area.tdb");
+        self.scene.verify_on_dem("area.tdb");
         let laid = Laid::open(&self.scene);
         laid.check();
         laid
