@@ -36,6 +36,8 @@ pub struct NetworkFound {
     pub lakes: u64,
     /// Those of them whose posts lie more than 0.5 m RMS off their level.
     pub lakes_off_level: u64,
+    /// Those of these whose shore had no room: their ground was levelled, and triangles pass over it as they may.
+    pub lakes_without_shore: u64,
 }
 
 /// What is found of the features of a database.
@@ -119,9 +121,10 @@ fn network(
 ) -> (NetworkFound, Vec<String>) {
     let ways = Ways::of(job, modules, aside);
     let ends = ways.ends(area);
-    let [lakes, lakes_off_level] = waters.counts(area);
+    let [lakes, lakes_off_level, lakes_without_shore] = waters.counts(area);
     let WaysFound { kept_m, pieces_missing, gaps } = ways.found;
-    let found = NetworkFound { kept_m, pieces_missing, gaps, ends: ends.len() as u64, lakes, lakes_off_level };
+    let ends = ends.len() as u64;
+    let found = NetworkFound { kept_m, pieces_missing, gaps, ends, lakes, lakes_off_level, lakes_without_shore };
     let mut problems: Vec<String> = ways.problem(area).into_iter().collect();
     let quanta = |at: f64, origin: f64| ((at - origin) * f64::from(QUANTA_PER_METRE)).round() as i64;
     let frame = area.frame;

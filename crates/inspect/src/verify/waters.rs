@@ -23,6 +23,8 @@ pub(crate) struct Waters(BTreeMap<Vec<FeatureSurface>, Posts>);
 struct Posts {
     count: u64,
     sum_squared: f64,
+    /// Whether its shore is in no triangles, for want of room.
+    is_shaped: bool,
 }
 
 impl Waters {
@@ -44,6 +46,7 @@ impl Waters {
             let level = body[0].ring[0].height;
             let key = body.iter().map(|surface| FeatureSurface { body: 0, ..surface.clone() }).collect();
             let sum = self.0.entry(key).or_default();
+            sum.is_shaped = features.bodies().count() <= number;
             for height in posts {
                 let off_m = height - metres_of_quanta(level);
                 (sum.count, sum.sum_squared) = (sum.count + 1, sum.sum_squared + off_m * off_m);
@@ -51,12 +54,13 @@ impl Waters {
         }
     }
 
-    /// Lakes of 1 ha and more by their posts, and those of them that lie off their level.
-    pub fn counts(&self, area: &GamingArea) -> [u64; 2] {
+    /// Lakes of 1 ha and more by their posts, those of them that lie off their level, and those of these whose shore had
+    /// no room.
+    pub fn counts(&self, area: &GamingArea) -> [u64; 3] {
         let post_m2 = area.frame.spacing.metres() * area.frame.spacing.metres();
         let large = || self.0.values().filter(|posts| AREA_MIN_M2 <= posts.count as f64 * post_m2);
-        let is_off = |posts: &&Posts| OFF_MAX_M * OFF_MAX_M < posts.sum_squared / posts.count as f64;
-        [large().count() as u64, large().filter(is_off).count() as u64]
+        let off = || large().filter(|posts| OFF_MAX_M * OFF_MAX_M < posts.sum_squared / posts.count as f64);
+        [large().count() as u64, off().count() as u64, off().filter(|posts| posts.is_shaped).count() as u64]
     }
 }
 

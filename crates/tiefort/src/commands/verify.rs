@@ -58,10 +58,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 
 /// What the load modules hold of roads, rivers and lakes.
 fn network(found: &inspect::NetworkFound) -> String {
-    let inspect::NetworkFound { kept_m, pieces_missing, gaps, ends, lakes, lakes_off_level } = *found;
+    let inspect::NetworkFound { kept_m, pieces_missing, gaps, ends, lakes, lakes_off_level, lakes_without_shore } =
+        *found;
+    let without_shore = match lakes_without_shore {
+        0 => String::new(),
+        count => format!(", {} of them without room for their shore", grouped(count)),
+    };
     format!(
         "network: {:.1} km kept, {} pieces missing, {} gaps of more than 30 m, {} ends where the source goes on, {} of \
-         {} lakes of a hectare and more off their level\n",
+         {} large lakes (a hectare) more than 0.5 m off their level{without_shore}\n",
         kept_m / 1000.0,
         grouped(pieces_missing),
         grouped(gaps),
