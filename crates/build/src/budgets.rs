@@ -16,6 +16,7 @@ use terrain::{LineStorey, TileId};
 use crate::CompileError;
 use crate::heard::Heard;
 use crate::level::shares;
+use crate::pieces::cost_of;
 use crate::profile::sound;
 use crate::read_features::ReadFeatures;
 use crate::run::Run;
@@ -113,15 +114,29 @@ impl Budgets {
         let mut job = self.job.clone();
         (job.limits.mean_per_load_module, job.limits.per_load_module) = (f64::from(mean), per_load_module);
         job.limits.window.limit = per_window;
-        let area = GamingArea::new(&job)?;
-        let spec = job.features.as_ref().expect("a job with features");
-        let (sounded, shares) = (self.heard.sounded(), shares(&area.budget, spec));
-        let each = self.workers.each();
-        let Levelled { reserved, .. } = self.read.features.level(sounded, (spec.options, spec.falls), &shares, &each);
+        let Levelled { reserved, .. } = self.levelled(&job, &GamingArea::new(&job)?);
         let lakes = reserved.amounts.values();
         let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
         let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();
         Ok(Budgeted { mean, per_load_module, per_window, kinds: self.kinds(&reserved.formed), lakes, triangles })
+    }
+
+    /// Triangles of each load module that features take within the limits of the job itself, row by row.
+    ///
+    /// # Errors
+    /// When the job is impossible.
+    pub(crate) fn reserved(&self) -> Result<Vec<u32>, CompileError> {
+        let area = GamingArea::new(&self.job)?;
+        let cost = cost_of(&self.job, area.grid, &self.levelled(&self.job, &area).reserved.cost);
+        let mut reserved = vec![0; area.grid.count()];
+        cost.iter().for_each(|&(module, _, triangles)| reserved[module as usize] += triangles);
+        Ok(reserved)
+    }
+
+    fn levelled(&self, job: &Job, area: &GamingArea) -> Levelled {
+        let spec = job.features.as_ref().expect("a job with features");
+        let shares = shares(&area.budget, spec);
+        self.read.features.level(self.heard.sounded(), (spec.options, spec.falls), &shares, &self.workers.each())
     }
 
     /// Metres by kind, kept and all, of what lies in the area and in no tunnel.

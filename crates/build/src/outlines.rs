@@ -114,9 +114,13 @@ impl ObjectBudgets {
         let found = FoundObjects::read(job, spec, &area, &workers.each())?;
         let free = features.map_or_else(Vec::new, Budgets::covered);
         let outlines = mended(found.objects, &spec.options).0;
-        let limits = limits_of(spec, &area.budget);
+        let mut budget = area.budget;
+        if let Some(features) = features.filter(|_| spec.joint) {
+            budget.reserved = features.reserved()?;
+        }
+        let limits = limits_of(spec, &budget);
         let claims = Claims::of(&outlines, &free, limits.size, job.modules.side_quanta.into());
-        Ok(Some(Self { spec: spec.clone(), budget: area.budget, claims }))
+        Ok(Some(Self { spec: spec.clone(), budget, claims }))
     }
 
     /// What would be kept with so many polygons in a load module, and 32 times as many in a square of 4 km.

@@ -76,6 +76,7 @@ pub(crate) fn prepare(
     let mut report = findings.report()?;
     let told = findings.told();
     report.features = told.as_ref().map(|told| told.report.clone());
+    report.objects = run.outlines.as_ref().map(|(_, outlines)| objects_report(run, outlines));
     let features = run.level.as_ref().map(|settled| (run.job, &settled.level));
     report.warnings.extend(crate::product::warnings(&Made { report: &report, features }));
     let mut manifest = beginning(run);
@@ -86,10 +87,7 @@ pub(crate) fn prepare(
         manifest.files.insert(files::BUILDINGS.to_owned(), buildings);
     }
     match &run.outlines {
-        Some((file, outlines)) => {
-            manifest.files.insert(files::OUTLINES.to_owned(), *file);
-            report.objects = Some(objects_report(run, outlines));
-        }
+        Some((file, _)) => drop(manifest.files.insert(files::OUTLINES.to_owned(), *file)),
         // That of an earlier job.
         None => run.database.remove(files::OUTLINES)?,
     }

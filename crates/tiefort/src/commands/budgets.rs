@@ -98,7 +98,8 @@ pub fn table_json(budgets: &[Budgeted]) -> Value {
     budgets.iter().map(of).collect()
 }
 
-/// What limits would keep of the objects of a job, up to the first that keeps nearly all.
+/// What limits would keep of the objects of a job, up to the first that keeps nearly all, or more than which the limits
+/// of the ground do not let in.
 pub fn of_objects(job: &Job, features: Option<&Budgets>) -> Vec<ObjectBudget> {
     let budgets = match ObjectBudgets::open(job, features, resources::cores()) {
         Ok(Some(budgets)) => budgets,
@@ -110,7 +111,11 @@ pub fn of_objects(job: &Job, features: Option<&Budgets>) -> Vec<ObjectBudget> {
     };
     let mut tried: Vec<ObjectBudget> = Vec::new();
     for most in OBJECT_BUDGETS {
-        tried.push(budgets.of(most));
+        let of = budgets.of(most);
+        if job.counts_objects() && tried.last().is_some_and(|last| last.kinds == of.kinds) {
+            break;
+        }
+        tried.push(of);
         if tried.last().is_some_and(ObjectBudget::holds) {
             break;
         }
@@ -129,9 +134,13 @@ pub fn objects_text(job: &Job, tried: &[ObjectBudget]) -> String {
         table.row(limits.into_iter().chain(of.kinds.iter().map(|sums| share([sums.kept_m2, sums.wanted_m2]))));
     }
     let own = job.objects.as_ref().map_or(0, |spec| spec.per_load_module);
+    let joint = match job.counts_objects() {
+        true => " They count in the limits of the ground, which hold back more: larger ones there keep it.",
+        false => "",
+    };
     format!(
         "\nWhat limits would keep of what objects hide: roofs, walls and triangles of woods in a load module and in a \
-         square of 4 km; the kept share of the silhouette of each kind. This job has {} in a load module.\n{}",
+         square of 4 km; the kept share of the silhouette of each kind. This job has {} in a load module.{joint}\n{}",
         grouped(own.into()),
         table.text(0)
     )

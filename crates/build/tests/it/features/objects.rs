@@ -165,7 +165,14 @@ fn objects_that_count_jointly_leave_the_ground_what_they_do_not_take() {
             (drawing, report)
         };
         let ((joint, report), (_, apart)) = (built("true"), built("false"));
-        let objects = report.objects.unwrap().polygons;
+        let (objects, kinds) = report.objects.as_ref().map(|of| (of.polygons, &of.kinds)).unwrap();
+        let job = &joint.scene.job;
+        let features = build::Budgets::open(job, 2).unwrap();
+        let foreseen = build::ObjectBudgets::open(job, features.as_ref(), 2).unwrap().unwrap();
+        for (foreseen, built) in foreseen.of(job.objects.as_ref().unwrap().per_load_module).kinds.iter().zip(kinds) {
+            let off_m2 = (foreseen.kept_m2 - built.kept_m2).abs();
+            assert!(off_m2 <= 0.1 * built.wanted_m2, "{limits}: {foreseen:?}, {built:?}");
+        }
         assert!(0 < objects && report.breaches.is_empty(), "{limits}: {objects}, {:?}", report.breaches);
         assert!(report.triangles < apart.triangles, "{limits}: the ground has less");
         let counted = (report.per_load_module.mean * 16.0).round() as u64;
@@ -190,7 +197,11 @@ fn what_had_no_room_is_told_and_what_no_job_wants_is_gone() {
     let mut drawing = drawing("[objects]\nlimits = { per_load_module = 30, per_4km_square = 60 }");
     drawing.built();
     let folder = Folder::new(drawing.scene.path("area.tdb"));
-    let report = folder.report().unwrap().objects.unwrap();
+    let report = folder.report().unwrap();
+    let is_told =
+        |kind: &str| report.warnings.iter().any(|told| told.contains(&format!("objects of kind {kind} hide")));
+    assert!(is_told("building"), "{:?}", report.warnings);
+    let report = report.objects.unwrap();
     assert!(report.per_load_module.max <= 30 && report.per_4km.max <= 60 && 0 < report.left_out, "{report:?}");
     let told = fs::read_to_string(folder.path(files::OBJECTS)).unwrap();
     assert!(told.contains("is full of what hides more than"), "{told}");
