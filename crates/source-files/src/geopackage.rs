@@ -13,34 +13,13 @@ use rusqlite::{Connection, OptionalExtension, Row};
 
 use crate::SourceError;
 use crate::crs::Crs;
-use crate::features::raw::{Part, RawShape};
+use crate::error::at_most;
+use crate::features::raw::RawShape;
 use crate::features::well_known::geometry;
 use crate::limits::{LAYERS_MAX, ROWS_MAX};
 
 /// How every one begins.
 pub(crate) const MARK: &[u8] = b"SQLite format 3\0";
-
-/// Rings of corners of a polygon.
-type Rings = Vec<Vec<[f64; 2]>>;
-
-/// A layer of polygons: its coordinate system, where it names one, and the rings of each polygon.
-pub(crate) struct Layer {
-    pub crs: Option<Crs>,
-    pub polygons: Vec<Rings>,
-}
-
-/// The layers of the GeoPackage at `path` that hold polygons, and its bytes.
-pub(crate) fn layers(path: &Path) -> Result<(Vec<Layer>, u64), SourceError> {
-    let package = Package::open(path)?;
-    let mut layers = Vec::new();
-    for table in package.tables()? {
-        let polygons = package.polygons(&table)?;
-        if !polygons.is_empty() {
-            layers.push(Layer { crs: package.crs(table.srs)?, polygons });
-        }
-    }
-    Ok((layers, package.bytes))
-}
 
 /// The names of the layers of the GeoPackage at `path`.
 pub(crate) fn layer_names(path: &Path) -> Result<Vec<String>, SourceError> {
@@ -119,10 +98,7 @@ impl<'a> Package<'a> {
             statement.query_map([], |row| Ok(Table { name: row.get(0)?, column: row.get(1)?, srs: row.get(2)? }));
         let tables: Result<Vec<Table>, _> = rows.map_err(|error| self.broken(error))?.collect();
         let tables = tables.map_err(|error| self.broken(error))?;
-        if LAYERS_MAX < tables.len() {
-            let (found, limit) = (tables.len() as u64, LAYERS_MAX as u64);
-            return Err(SourceError::TooLarge { path: self.path.into(), what: "layers", found, limit });
-        }
+        at_most(self.path, tables.len() as u64, LAYERS_MAX as u64, "layers")?;
         for table in &tables {
             if !self.is_table(&table.name)? {
                 return Err(self.malformed(format!("a layer `{}` that is no table", table.name), "plain tables"));
@@ -149,35 +125,20 @@ impl<'a> Package<'a> {
         }
     }
 
-    fn polygons(&self, table: &Table) -> Result<Vec<Rings>, SourceError> {
-        let mut polygons = Vec::new();
+    /// Tells `found` the shape of every row of a layer.
+    pub(crate) fn shapes(
+        &self,
+        table: &Table,
+        mut found: impl FnMut(RawShape) -> Result<(), SourceError>,
+    ) -> Result<(), SourceError> {
         self.rows(table, &quoted(&table.column), |row| {
             let value = row.get_ref(0).map_err(|error| self.broken(error))?;
             // A feature without a geometry is legal and adds nothing.
-            if let Some(blob) = value.as_blob_or_null().map_err(|error| self.broken(error))? {
-                let shape = geometry(blob).map_err(|found| self.malformed(found, "whole geometries"))?;
-                self.add_polygons(shape, &mut polygons)?;
+            match value.as_blob_or_null().map_err(|error| self.broken(error))? {
+                Some(blob) => found(geometry(blob).map_err(|found| self.malformed(found, "whole geometries"))?),
+                None => Ok(()),
             }
-            Ok(())
-        })?;
-        Ok(polygons)
-    }
-
-    fn add_polygons(&self, shape: RawShape, polygons: &mut Vec<Rings>) -> Result<(), SourceError> {
-        let refused = |found| Err(SourceError::NotPolygons { path: self.path.into(), found });
-        if let Some(other) = shape.other {
-            return refused(other);
-        }
-        for part in shape.parts {
-            let rings = match part {
-                Part::Polygon(rings) => rings,
-                Part::Line(_) => return refused("LineString"),
-                Part::Point(_) => return refused("Point"),
-            };
-            let flat = |ring: Vec<[f64; 3]>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
-            polygons.push(rings.into_iter().map(flat).collect());
-        }
-        Ok(())
+        })
     }
 
     /// The names of all columns of a layer, but for that of its number, with the place of each in a row.
@@ -220,10 +181,7 @@ impl<'a> Package<'a> {
                 let found = format!("rows of `{}` that hold more bytes than the file", table.name);
                 return Err(self.malformed(found, "a sound GeoPackage"));
             }
-            if ROWS_MAX < count {
-                let (what, found, limit) = ("features (or more)", count, ROWS_MAX);
-                return Err(SourceError::TooLarge { path: self.path.into(), what, found, limit });
-            }
+            at_most(self.path, count, ROWS_MAX, "features (or more)")?;
             found(row)?;
         }
         Ok(())

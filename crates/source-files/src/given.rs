@@ -5,14 +5,16 @@
 
 use std::path::Path;
 
-use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, Position};
+use geojson::{GeoJson, Geometry, GeometryValue, JsonObject};
 use terrain::mask::Polygon;
 
 use crate::SourceError;
 use crate::allowance::Allowance;
 use crate::crs::Crs;
-use crate::limits::GEOJSON_BYTES_MAX;
-use crate::polygons::{corner, projected, said_in};
+use crate::features::clip::Vertex;
+use crate::features::raw::Part;
+use crate::features::strict::{self, said_in};
+use crate::polygons::projected;
 use crate::store::Store;
 
 /// One thing of a file.
@@ -46,15 +48,8 @@ pub enum GivenShape {
 /// brought to the area's system.
 pub fn read_given(path: &Path, epsg: u32) -> Result<Vec<GivenFeature>, SourceError> {
     let store = Store::plain(path)?;
-    if GEOJSON_BYTES_MAX < store.len() {
-        let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
-        return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
-    }
-    let bytes = store.start(GEOJSON_BYTES_MAX)?;
-    let text = std::str::from_utf8(&bytes)
-        .map_err(|_| fault(path, "the file", "bytes that are not UTF-8 text", "GeoJSON or comma-separated values"))?;
-    // Some editors put a byte order mark before UTF-8 text.
-    let text = text.trim_start_matches('\u{feff}');
+    let no_text = || fault(path, "the file", "bytes that are not UTF-8 text", "GeoJSON or comma-separated values");
+    let text = &*store.text(no_text)?;
     let is_json = text.trim_start().starts_with('{');
     let (features, said) = if is_json { of_json(path, text)? } else { of_table(path, text)? };
     if features.is_empty() {
@@ -104,28 +99,16 @@ fn of_json(path: &Path, text: &str) -> Result<(Vec<GivenFeature>, Option<Crs>), 
     let json: GeoJson =
         text.parse().map_err(|error: geojson::Error| fault(path, "the file", error.to_string(), "GeoJSON"))?;
     let said = said_in(path, &json)?;
+    let is_alone = matches!(json, GeoJson::Geometry(_));
     let mut found = Vec::new();
-    match json {
-        GeoJson::Geometry(geometry) => add(path, "the geometry", geometry, &JsonObject::new(), &mut found)?,
-        GeoJson::Feature(feature) => add_feature(path, 0, feature, &mut found)?,
-        GeoJson::FeatureCollection(FeatureCollection { features, .. }) => {
-            for (index, feature) in features.into_iter().enumerate() {
-                add_feature(path, index, feature, &mut found)?;
-            }
+    for (index, feature) in strict::features(json).into_iter().enumerate() {
+        let place = if is_alone { "the geometry".to_owned() } else { format!("feature {index}") };
+        // A feature without a geometry is legal and adds nothing.
+        if let Some(geometry) = feature.geometry {
+            add(path, &place, geometry, &feature.properties.unwrap_or_default(), &mut found)?;
         }
     }
     Ok((found, said))
-}
-
-fn add_feature(
-    path: &Path,
-    index: usize,
-    feature: geojson::Feature,
-    found: &mut Vec<GivenFeature>,
-) -> Result<(), SourceError> {
-    // A feature without a geometry is legal and adds nothing.
-    let Some(geometry) = feature.geometry else { return Ok(()) };
-    add(path, &format!("feature {index}"), geometry, &feature.properties.unwrap_or_default(), found)
 }
 
 fn add(
@@ -135,38 +118,36 @@ fn add(
     properties: &JsonObject,
     found: &mut Vec<GivenFeature>,
 ) -> Result<(), SourceError> {
-    let mut put = |shape, height_m| -> Result<(), SourceError> {
-        let (height_m, factor) =
-            (number(path, place, properties, "height_m")?.or(height_m), number(path, place, properties, "factor")?);
-        let pin = properties.get("pin").and_then(|pin| pin.as_str()).map(str::to_owned);
-        found.push(GivenFeature { place: place.to_owned(), shape, pin, height_m, factor });
-        Ok(())
-    };
-    let mut point = |position: &Position| {
-        let at = corner(position).ok_or_else(|| fault(path, place, "no two finite numbers", "a place"))?;
-        put(GivenShape::Point(at), position.as_slice().get(2).copied())
-    };
-    let ring = |positions: &Vec<Position>| {
-        let corners: Option<Vec<[f64; 2]>> = positions.iter().map(corner).collect();
-        corners.filter(|corners| 4 <= corners.len() && corners.first() == corners.last())
-    };
-    let polygon = |rings: Vec<Vec<Position>>| {
-        let rings: Option<Vec<_>> = rings.iter().map(ring).collect();
-        let whole = rings.ok_or_else(|| fault(path, place, "a ring that is not one", "closed rings of 4 corners"))?;
-        Ok(GivenShape::Polygon(Polygon { rings: whole }))
-    };
-    match geometry.value {
-        GeometryValue::Point { coordinates } => point(&coordinates),
-        GeometryValue::MultiPoint { coordinates } => coordinates.iter().try_for_each(point),
-        GeometryValue::Polygon { coordinates } => put(polygon(coordinates)?, None),
-        GeometryValue::MultiPolygon { coordinates } => {
-            coordinates.into_iter().try_for_each(|rings| put(polygon(rings)?, None))
-        }
-        GeometryValue::GeometryCollection { .. } => Err(fault(path, place, "a GeometryCollection", "Point or Polygon")),
-        GeometryValue::LineString { .. } | GeometryValue::MultiLineString { .. } => {
-            Err(fault(path, place, "a LineString (not supported yet)", "Point or Polygon"))
-        }
+    let (said_m, factor) = (number(path, place, properties, "height_m")?, number(path, place, properties, "factor")?);
+    let pin = properties.get("pin").and_then(|pin| pin.as_str()).map(str::to_owned);
+    if let GeometryValue::GeometryCollection { .. } = geometry.value {
+        return Err(fault(path, place, "a GeometryCollection", "Point or Polygon"));
     }
+    let is_finite = |[east, north, _]: &Vertex| east.is_finite() && north.is_finite();
+    for part in strict::shape_of(geometry).parts {
+        let (shape, height_m) = match part {
+            Part::Point(vertex) if is_finite(&vertex) => {
+                (GivenShape::Point([vertex[0], vertex[1]]), Some(vertex[2]).filter(|height_m| !height_m.is_nan()))
+            }
+            Part::Point(_) => return Err(fault(path, place, "no two finite numbers", "a place")),
+            Part::Polygon(rings) => {
+                let is_ring = |ring: &Vec<Vertex>| {
+                    4 <= ring.len() && ring.iter().all(is_finite) && ring[0][..2] == ring[ring.len() - 1][..2]
+                };
+                if !rings.iter().all(is_ring) {
+                    return Err(fault(path, place, "a ring that is not one", "closed rings of 4 corners"));
+                }
+                let flat = |ring: Vec<Vertex>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
+                (GivenShape::Polygon(Polygon { rings: rings.into_iter().map(flat).collect() }), None)
+            }
+            Part::Line(_) => {
+                return Err(fault(path, place, "a LineString (not supported yet)", "Point or Polygon"));
+            }
+        };
+        let (place, pin, height_m) = (place.to_owned(), pin.clone(), said_m.or(height_m));
+        found.push(GivenFeature { place, shape, pin, height_m, factor });
+    }
+    Ok(())
 }
 
 fn number(path: &Path, place: &str, properties: &JsonObject, key: &str) -> Result<Option<f64>, SourceError> {

@@ -6,12 +6,18 @@
 
 use std::path::Path;
 
-use geojson::{FeatureCollection, GeoJson, Geometry, GeometryValue, JsonObject, JsonValue, Position};
+use geojson::GeoJson;
 use terrain::mask::Polygon;
 
 use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;
+use crate::error::at_most;
+use crate::features::clip::Vertex;
+use crate::features::raw::{Part, RawShape};
+use crate::features::strict::{self, said_in};
+use crate::geopackage::Package;
 use crate::limits::GEOJSON_BYTES_MAX;
+use crate::shapefile::Shape;
 use crate::shapefile_parts::Parts;
 use crate::store::Store;
 use crate::{SourceError, geopackage, shapefile};
@@ -27,25 +33,20 @@ pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError
     if store.start(4)? == b"PK\x03\x04" {
         store = Store::zipped_shapefile(path)?.swap_remove(0);
     }
-    if GEOJSON_BYTES_MAX < store.len() {
-        let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
-        return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
-    }
+    at_most(path, store.len(), GEOJSON_BYTES_MAX, "bytes")?;
     if store.start(geopackage::MARK.len() as u64)? == geopackage::MARK {
         return of_geopackage(path, epsg);
     }
-    let bytes = store.start(GEOJSON_BYTES_MAX)?;
     let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
-    let said = match bytes.starts_with(&shapefile::MARK) {
+    let said = match store.start(4)? == shapefile::MARK {
         true => {
-            let parts = Parts::of(&store)?;
-            for rings in shapefile::rings(&store, &bytes, parts.index()?.as_deref())? {
-                let rings = rings.into_iter().map(|ring| collected.closed(Some(ring))).collect::<Result<_, _>>()?;
-                collected.polygons.push(Polygon { rings });
+            let (parts, bytes) = (Parts::of(&store)?, store.start(GEOJSON_BYTES_MAX)?);
+            for shape in shapefile::shapes(&store, &bytes, parts.index()?.as_deref())? {
+                collected.add_record(shape?)?;
             }
             parts.system()?
         }
-        false => collected.add_json(&bytes)?,
+        false => collected.add_json(&store)?,
     };
     if collected.polygons.is_empty() {
         return Err(SourceError::NoPolygons { path: path.into() });
@@ -57,14 +58,14 @@ pub fn read_polygons(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError
 fn of_geopackage(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
     let mut collected = Collected { path, polygons: Vec::new(), rings: 0 };
     let mut all = Vec::new();
-    let (layers, bytes) = geopackage::layers(path)?;
-    let allowance = Allowance::new(path, bytes);
-    for layer in layers {
-        for rings in layer.polygons {
-            let rings = rings.into_iter().map(|ring| collected.closed(Some(ring))).collect::<Result<_, _>>()?;
-            collected.polygons.push(Polygon { rings });
+    let package = Package::open(path)?;
+    let allowance = Allowance::new(path, package.bytes());
+    for table in package.tables()? {
+        package.shapes(&table, |shape| collected.add(shape))?;
+        let polygons = std::mem::take(&mut collected.polygons);
+        if !polygons.is_empty() {
+            all.append(&mut placed(&allowance, polygons, package.crs(table.srs)?, epsg)?);
         }
-        all.append(&mut placed(&allowance, std::mem::take(&mut collected.polygons), layer.crs, epsg)?);
     }
     if all.is_empty() { Err(SourceError::NoPolygons { path: path.into() }) } else { Ok(all) }
 }
@@ -140,62 +141,59 @@ struct Collected<'a> {
 
 impl Collected<'_> {
     /// Adds all polygons of a GeoJSON text; returns the system that it names.
-    fn add_json(&mut self, bytes: &[u8]) -> Result<Option<Crs>, SourceError> {
+    fn add_json(&mut self, store: &Store) -> Result<Option<Crs>, SourceError> {
         let broken = |reason: String| SourceError::NotGeoJson { path: self.path.into(), reason };
-        let text = std::str::from_utf8(bytes).map_err(|_| broken("it is not UTF-8 text".into()))?;
-        // Some editors put a byte order mark before UTF-8 text.
-        let text = text.trim_start_matches('\u{feff}');
+        let text = store.text(|| broken("it is not UTF-8 text".into()))?;
         let json: GeoJson = text.parse().map_err(|error: geojson::Error| broken(error.to_string()))?;
         let said = said_in(self.path, &json)?;
-        match json {
-            GeoJson::Geometry(geometry) => self.add(geometry)?,
-            GeoJson::Feature(feature) => self.add_some(feature.geometry)?,
-            GeoJson::FeatureCollection(FeatureCollection { features, .. }) => {
-                features.into_iter().try_for_each(|feature| self.add_some(feature.geometry))?;
-            }
-        }
+        // A feature without a geometry is legal and adds nothing.
+        let geometries = strict::features(json).into_iter().filter_map(|feature| feature.geometry);
+        geometries.map(strict::shape_of).try_for_each(|shape| self.add(shape))?;
         Ok(said)
     }
 
-    /// A feature without a geometry is legal and adds nothing.
-    fn add_some(&mut self, geometry: Option<Geometry>) -> Result<(), SourceError> {
-        geometry.map_or(Ok(()), |geometry| self.add(geometry))
-    }
-
-    fn add(&mut self, geometry: Geometry) -> Result<(), SourceError> {
-        let found = match geometry.value {
-            GeometryValue::Polygon { coordinates } => return self.add_polygon(coordinates),
-            GeometryValue::MultiPolygon { coordinates } => {
-                return coordinates.into_iter().try_for_each(|polygon| self.add_polygon(polygon));
+    fn add(&mut self, shape: RawShape) -> Result<(), SourceError> {
+        let refused = |found| Err(SourceError::NotPolygons { path: self.path.into(), found });
+        if let Some(other) = shape.other {
+            return refused(other);
+        }
+        for part in shape.parts {
+            match part {
+                Part::Polygon(rings) => self.add_rings(rings)?,
+                Part::Line(_) => return refused("LineString"),
+                Part::Point(_) => return refused("Point"),
             }
-            GeometryValue::GeometryCollection { geometries } => {
-                return geometries.into_iter().try_for_each(|geometry| self.add(geometry));
-            }
-            GeometryValue::Point { .. } => "Point",
-            GeometryValue::MultiPoint { .. } => "MultiPoint",
-            GeometryValue::LineString { .. } => "LineString",
-            GeometryValue::MultiLineString { .. } => "MultiLineString",
-        };
-        Err(SourceError::NotPolygons { path: self.path.into(), found })
-    }
-
-    fn add_polygon(&mut self, rings: Vec<Vec<Position>>) -> Result<(), SourceError> {
-        let rings: Result<_, _> = rings.iter().map(|ring| self.ring(ring)).collect();
-        self.polygons.push(Polygon { rings: rings? });
+        }
         Ok(())
     }
 
-    fn ring(&mut self, positions: &[Position]) -> Result<Vec<[f64; 2]>, SourceError> {
-        self.closed(positions.iter().map(corner).collect())
+    /// All rings of a record are one polygon.
+    fn add_record(&mut self, shape: Shape) -> Result<(), SourceError> {
+        let refused = |found| Err(SourceError::NotPolygons { path: self.path.into(), found });
+        match shape {
+            Shape::Nothing => Ok(()),
+            Shape::Rings { rings, .. } => self.add_rings(rings),
+            Shape::Points(_) => refused("Point"),
+            Shape::Lines { .. } => refused("PolyLine"),
+            Shape::Other(found) => refused(found),
+        }
+    }
+
+    fn add_rings(&mut self, rings: Vec<Vec<Vertex>>) -> Result<(), SourceError> {
+        let flat = |ring: Vec<Vertex>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
+        let rings = rings.into_iter().map(|ring| self.closed(flat(ring))).collect::<Result<_, _>>()?;
+        self.polygons.push(Polygon { rings });
+        Ok(())
     }
 
     /// Checks that a ring is one.
-    fn closed(&mut self, corners: Option<Vec<[f64; 2]>>) -> Result<Vec<[f64; 2]>, SourceError> {
+    fn closed(&mut self, corners: Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>, SourceError> {
         let ring = self.rings;
         self.rings += 1;
         let wrong = |found: String| SourceError::Ring { path: self.path.into(), ring, found };
-        let finite = corners.filter(|corners| corners.as_flattened().iter().all(|number| number.is_finite()));
-        let corners = finite.ok_or_else(|| wrong("a corner without two finite numbers".into()))?;
+        if !corners.as_flattened().iter().all(|number| number.is_finite()) {
+            return Err(wrong("a corner without two finite numbers".into()));
+        }
         if corners.len() < 4 {
             return Err(wrong(format!("{} corners", corners.len())));
         }
@@ -204,40 +202,4 @@ impl Collected<'_> {
         }
         Ok(corners)
     }
-}
-
-pub(crate) fn corner(position: &Position) -> Option<[f64; 2]> {
-    let &[east_m, north_m, ..] = position.as_slice() else { return None };
-    (east_m.is_finite() && north_m.is_finite()).then_some([east_m, north_m])
-}
-
-/// The system that the `crs` member of a file names.
-pub(crate) fn said_in(path: &Path, json: &GeoJson) -> Result<Option<Crs>, SourceError> {
-    let members: Option<&JsonObject> = match json {
-        GeoJson::Geometry(geometry) => geometry.foreign_members.as_ref(),
-        GeoJson::Feature(feature) => feature.foreign_members.as_ref(),
-        GeoJson::FeatureCollection(features) => features.foreign_members.as_ref(),
-    };
-    said_by(path, members.and_then(|members| members.get("crs")).filter(|crs| !crs.is_null()))
-}
-
-/// The same of its member `crs`, where it has one.
-pub(crate) fn said_by(path: &Path, crs: Option<&JsonValue>) -> Result<Option<Crs>, SourceError> {
-    let Some(crs) = crs else { return Ok(None) };
-    let refused = |found: String| SourceError::UnnamedCrs { path: path.into(), found };
-    match crs.pointer("/properties/name").and_then(|name| name.as_str()) {
-        None => Err(refused(format!("an unnamed system ({crs})"))),
-        // Longitude first, which is how all GeoJSON is written.
-        Some(name) if name.ends_with("CRS84") => Ok(Some(Crs::wgs84())),
-        Some(name) => match epsg_of(name) {
-            None => Err(refused(name.to_owned())),
-            Some(code) => Crs::from_epsg(code).map(Some).map_err(|found| refused(format!("{name}: {found}"))),
-        },
-    }
-}
-
-/// The code in `EPSG:32611`, `urn:ogc:def:crs:EPSG::32611` or `http://www.opengis.net/def/crs/EPSG/0/32611`.
-fn epsg_of(name: &str) -> Option<u32> {
-    let code = name.rsplit([':', '/']).next()?;
-    name.to_ascii_uppercase().contains("EPSG").then(|| code.parse().ok()).flatten()
 }

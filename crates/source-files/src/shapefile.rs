@@ -45,25 +45,6 @@ pub(crate) fn shapes<'a>(
     Ok(places.into_iter().map(move |at| shape(store, bytes, at)))
 }
 
-/// The rings of each polygon, for readers of polygons only.
-pub(crate) fn rings(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result<Vec<Vec<Vec<[f64; 2]>>>, SourceError> {
-    let mut polygons = Vec::new();
-    let refused = |found| Err(SourceError::NotPolygons { path: store.path().into(), found });
-    for shape in shapes(store, bytes, index)? {
-        match shape? {
-            Shape::Nothing => {}
-            Shape::Rings { rings, .. } => {
-                let flat = |ring: Vec<[f64; 3]>| ring.into_iter().map(|[east, north, _]| [east, north]).collect();
-                polygons.push(rings.into_iter().map(flat).collect());
-            }
-            Shape::Points(_) => return refused("Point"),
-            Shape::Lines { .. } => return refused("PolyLine"),
-            Shape::Other(found) => return refused(found),
-        }
-    }
-    Ok(polygons)
-}
-
 fn shape(store: &Store, bytes: &[u8], at: usize) -> Result<Shape, SourceError> {
     let record = part(store, bytes, at + 8, 2 * big(&part(store, bytes, at, 8)?[4..]))?;
     let kind = whole(store, record, 0)?;

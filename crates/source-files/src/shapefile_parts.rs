@@ -3,6 +3,7 @@
 use crate::SourceError;
 use crate::beside::beside;
 use crate::crs::Crs;
+use crate::error::at_most;
 use crate::limits::SHAPEFILE_BYTES_MAX;
 use crate::store::Store;
 
@@ -54,9 +55,6 @@ impl Parts {
 
 /// All bytes of a part, which are held in memory.
 pub(crate) fn whole(store: &Store) -> Result<Vec<u8>, SourceError> {
-    if SHAPEFILE_BYTES_MAX < store.len() {
-        let (found, limit) = (store.len(), SHAPEFILE_BYTES_MAX);
-        return Err(SourceError::TooLarge { path: store.path().into(), what: "bytes", found, limit });
-    }
+    at_most(store.path(), store.len(), SHAPEFILE_BYTES_MAX, "bytes")?;
     store.start(SHAPEFILE_BYTES_MAX)
 }

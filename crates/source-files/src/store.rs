@@ -12,8 +12,10 @@ use zip::ZipArchive;
 
 use crate::SourceError;
 use crate::content::regular;
+use crate::error::at_most;
 use crate::limits::{
-    ARCHIVE_ENTRIES_MAX, UNPACKED_BYTES_MAX, UNPACKED_FEATURE_BYTES_A_BYTE, UNPACKED_FEATURE_BYTES_FREE,
+    ARCHIVE_ENTRIES_MAX, GEOJSON_BYTES_MAX, UNPACKED_BYTES_MAX, UNPACKED_FEATURE_BYTES_A_BYTE,
+    UNPACKED_FEATURE_BYTES_FREE,
 };
 
 /// Where the bytes of a source are.
@@ -129,10 +131,7 @@ impl Store {
     /// A zip file, and the names of the files in it.
     fn archive(&self) -> Result<(ZipArchive<Handle>, Vec<String>), SourceError> {
         let archive = ZipArchive::new(self.handle()?).map_err(|error| self.broken(error.to_string()))?;
-        if ARCHIVE_ENTRIES_MAX < archive.len() {
-            let (found, limit) = (archive.len() as u64, ARCHIVE_ENTRIES_MAX as u64);
-            return Err(SourceError::TooLarge { path: self.path.clone(), what: "files in an archive", found, limit });
-        }
+        at_most(&self.path, archive.len() as u64, ARCHIVE_ENTRIES_MAX as u64, "files in an archive")?;
         let names = (0..archive.len())
             .filter_map(|index| archive.name_for_index(index)?.ok().map(std::borrow::Cow::into_owned))
             .filter(|name| !name.ends_with('/'))
@@ -160,10 +159,7 @@ impl Store {
             .take(limit + 1)
             .read_to_end(&mut bytes)
             .map_err(|error| self.broken(format!("it cannot be unpacked: {error}")))?;
-        if limit < bytes.len() as u64 {
-            let what = "bytes once unpacked (or more)";
-            return Err(SourceError::TooLarge { path: self.path.clone(), what, found: limit + 1, limit });
-        }
+        at_most(&self.path, bytes.len() as u64, limit, "bytes once unpacked (or more)")?;
         Ok(bytes)
     }
 
@@ -212,6 +208,16 @@ impl Store {
         let mut bytes = Vec::new();
         self.handle()?.take(count).read_to_end(&mut bytes).map_err(|source| self.stopped(source))?;
         Ok(bytes)
+    }
+
+    /// All of it as text, without the byte order mark that some editors put before it.
+    ///
+    /// # Errors
+    /// When it is longer than that of GeoJSON may be, or what `no_text` says where it is no text.
+    pub(crate) fn text(&self, no_text: impl FnOnce() -> SourceError) -> Result<String, SourceError> {
+        at_most(&self.path, self.len, GEOJSON_BYTES_MAX, "bytes")?;
+        let text = String::from_utf8(self.start(GEOJSON_BYTES_MAX)?).map_err(|_| no_text())?;
+        Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
     }
 
     /// `count` bytes from `at`.

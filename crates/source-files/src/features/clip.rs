@@ -4,7 +4,7 @@
 //! coordinates is exactly that of the side; so equal segments of two features are cut at equal places.
 
 /// A place and its height; the height is NaN where there is none.
-pub(super) type Vertex = [f64; 3];
+pub(crate) type Vertex = [f64; 3];
 
 /// A rectangle: of places in some coordinate system, both sides of each axis included.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,10 +7,10 @@ use parquet::basic::{ConvertedType, Repetition, Type as Physical};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 
-use super::columns::with_packed_tags;
+use super::columns::{Texts, with_packed_tags};
 use super::model::{FeatureFile, Wanted, file_name};
 use super::overture::{self, Holds, Rule};
-use super::placing::{LEFT_OUT, Placing, Texts};
+use super::placing::{LEFT_OUT, Placing};
 use super::raw::{Part, RawFeature, RawShape};
 use super::well_known::binary;
 use crate::SourceError;

@@ -1,6 +1,11 @@
 //! Attributes: the table beside a Shapefile (`.dbf`), and tags that GDAL packs into one column.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use super::model::Tags;
 use crate::SourceError;
+use crate::allowance::Allowance;
 use crate::store::Store;
 
 /// The rows of a table: each the name and the text of every column that holds something.
@@ -104,6 +109,38 @@ pub(super) fn with_packed_tags<'t>(all: impl IntoIterator<Item = (&'t str, &'t s
 fn packed(text: &str) -> Option<Vec<(&str, &str)>> {
     let inner = text.trim().strip_prefix('"')?.strip_suffix('"')?;
     inner.split("\",\"").map(|pair| pair.split_once("\"=>\"")).collect()
+}
+
+/// Texts that are the same, kept once.
+#[derive(Debug, Default)]
+pub(super) struct Texts {
+    kept: HashSet<Arc<str>>,
+    /// Bytes kept since they were last asked for.
+    bytes: usize,
+}
+
+impl Texts {
+    pub(super) fn keep(&mut self, text: &str) -> Arc<str> {
+        if let Some(kept) = self.kept.get(text) {
+            return kept.clone();
+        }
+        let kept: Arc<str> = text.into();
+        self.kept.insert(kept.clone());
+        self.bytes += text.len() + 64;
+        kept
+    }
+
+    /// Counts what was kept since this was last called.
+    pub(super) fn count(&mut self, allowance: &Allowance) {
+        allowance.count(std::mem::take(&mut self.bytes));
+    }
+
+    /// Tags in the order that features have them.
+    pub(super) fn tags<'t>(&mut self, all: impl IntoIterator<Item = (&'t str, &'t str)>) -> Tags {
+        let mut tags: Tags = all.into_iter().map(|(key, value)| (self.keep(key), self.keep(value))).collect();
+        tags.sort();
+        tags
+    }
 }
 
 #[cfg(test)]

@@ -1,31 +1,28 @@
 //! Lines and polygons from GeoJSON, with its properties as tags.
 
-use geojson::{Feature, GeoJson, Geometry, GeometryValue, JsonValue, Position};
+use geojson::{Feature, GeoJson, JsonValue};
 
-use super::clip::Vertex;
-use super::columns::with_packed_tags;
+use super::columns::{Texts, with_packed_tags};
 use super::loose::{self, Loose};
 use super::model::{FeatureFile, Wanted, file_name};
-use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
-use super::raw::{Part, RawFeature, RawShape};
+use super::placing::{LEFT_OUT, Placing, look_like_degrees};
+use super::raw::RawFeature;
+use super::strict::{self, said_by, said_in, shape_of};
 use crate::SourceError;
 use crate::crs::Crs;
-use crate::limits::GEOJSON_BYTES_MAX;
-use crate::polygons::{said_by, said_in};
 use crate::store::Store;
 
 pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
     let path = store.path();
-    if GEOJSON_BYTES_MAX < store.len() {
-        let (found, limit) = (store.len(), GEOJSON_BYTES_MAX);
-        return Err(SourceError::TooLarge { path: path.into(), what: "bytes", found, limit });
-    }
     let broken = |reason: String| SourceError::NotGeoJson { path: path.into(), reason };
-    let text = String::from_utf8(store.start(GEOJSON_BYTES_MAX)?);
-    let text = text.map_err(|_| broken("it is not UTF-8 text".into()))?;
-    let text = text.trim_start_matches('\u{feff}');
+    let text = &*store.text(|| broken("it is not UTF-8 text".into()))?;
     let (said, features) = match text.parse::<GeoJson>() {
-        Ok(json) => (wanted.system(|| said_in(path, &json))?, strict(json)),
+        Ok(json) => {
+            let said = wanted.system(|| said_in(path, &json))?;
+            let loose =
+                |Feature { geometry, properties, .. }| Loose { properties, shape: geometry.map(|of| Ok(shape_of(of))) };
+            (said, strict::features(json).into_iter().map(loose).collect())
+        }
         Err(error) => {
             let (crs, features) = loose::read(text).ok_or_else(|| broken(error.to_string()))?;
             (wanted.system(|| said_by(path, crs.as_ref()))?, features)
@@ -58,16 +55,6 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     placing.finish(None)
 }
 
-fn strict(json: GeoJson) -> Vec<Loose> {
-    let features = match json {
-        GeoJson::Geometry(geometry) => vec![Feature { geometry: Some(geometry), ..Feature::default() }],
-        GeoJson::Feature(feature) => vec![feature],
-        GeoJson::FeatureCollection(collection) => collection.features,
-    };
-    let of = |Feature { geometry, properties, .. }| Loose { properties, shape: geometry.map(|of| Ok(shape_of(of))) };
-    features.into_iter().map(of).collect()
-}
-
 /// A property as a tag's value: texts as they are, numbers and booleans as written.
 fn text_of(value: JsonValue) -> Option<String> {
     match value {
@@ -75,54 +62,4 @@ fn text_of(value: JsonValue) -> Option<String> {
         JsonValue::String(text) => Some(text),
         other => Some(other.to_string()),
     }
-}
-
-fn shape_of(geometry: Geometry) -> RawShape {
-    let mut shape = RawShape::default();
-    add(geometry, &mut shape);
-    shape
-}
-
-fn add(geometry: Geometry, shape: &mut RawShape) {
-    match geometry.value {
-        GeometryValue::LineString { coordinates } => add_line(&coordinates, shape),
-        GeometryValue::MultiLineString { coordinates } => {
-            coordinates.iter().for_each(|line| add_line(line, shape));
-        }
-        GeometryValue::Polygon { coordinates } => add_polygon(&coordinates, shape),
-        GeometryValue::MultiPolygon { coordinates } => {
-            coordinates.iter().for_each(|polygon| add_polygon(polygon, shape));
-        }
-        GeometryValue::GeometryCollection { geometries } => {
-            geometries.into_iter().for_each(|geometry| add(geometry, shape));
-        }
-        GeometryValue::Point { coordinates } => add_points(&[coordinates], shape),
-        GeometryValue::MultiPoint { coordinates } => add_points(&coordinates, shape),
-    }
-}
-
-fn add_line(positions: &[Position], shape: &mut RawShape) {
-    let line = vertices(positions, shape);
-    shape.parts.push(Part::Line(line));
-}
-
-fn add_points(positions: &[Position], shape: &mut RawShape) {
-    let points = vertices(positions, shape);
-    shape.parts.extend(points.into_iter().map(Part::Point));
-}
-
-fn add_polygon(rings: &[Vec<Position>], shape: &mut RawShape) {
-    let rings = rings.iter().map(|ring| vertices(ring, shape)).collect();
-    shape.parts.push(Part::Polygon(rings));
-}
-
-/// A position without two numbers is nowhere, which is told like any place that is not on the Earth.
-fn vertices(positions: &[Position], shape: &mut RawShape) -> Vec<Vertex> {
-    let vertex = |position: &Position| {
-        let number = |axis: usize| position.as_slice().get(axis).copied().unwrap_or(f64::NAN);
-        [number(0), number(1), number(2)]
-    };
-    let vertices: Vec<Vertex> = positions.iter().map(vertex).collect();
-    shape.has_heights |= positions.iter().any(|position| 2 < position.as_slice().len());
-    vertices
 }

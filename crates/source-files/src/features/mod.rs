@@ -22,6 +22,7 @@ mod packages;
 mod placing;
 pub(crate) mod raw;
 mod shapes;
+pub(crate) mod strict;
 pub(crate) mod well_known;
 
 pub use clip::Extent;

@@ -6,9 +6,9 @@ use rusqlite::Row;
 use rusqlite::types::ValueRef;
 
 use super::clip::Vertex;
-use super::columns::with_packed_tags;
+use super::columns::{Texts, with_packed_tags};
 use super::model::{FeatureFile, Wanted};
-use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
+use super::placing::{LEFT_OUT, Placing, look_like_degrees};
 use super::raw::RawFeature;
 use super::well_known::geometry;
 use crate::SourceError;

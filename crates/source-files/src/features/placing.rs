@@ -1,50 +1,17 @@
 //! From a file's coordinates to those of the area: what is not on the Earth is left out, what is far away is cut off
 //! before it is projected, and what is left is cut at the bounds.
 
-use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Arc;
 
 use super::clip::{self, Extent, Vertex};
 use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
-use super::raw::{Part, RawFeature, RawShape};
+use super::raw::{Part, RawFeature};
 use crate::SourceError;
 use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;
 use crate::limits::{HEIGHT_M_MAX, REMARKS_MAX};
 use crate::polygons::pieces_of;
-
-/// Texts that are the same, kept once.
-#[derive(Debug, Default)]
-pub(super) struct Texts {
-    kept: HashSet<Arc<str>>,
-    /// Bytes kept since they were last asked for.
-    bytes: usize,
-}
-
-impl Texts {
-    pub(super) fn keep(&mut self, text: &str) -> Arc<str> {
-        if let Some(kept) = self.kept.get(text) {
-            return kept.clone();
-        }
-        let kept: Arc<str> = text.into();
-        self.kept.insert(kept.clone());
-        self.bytes += text.len() + 64;
-        kept
-    }
-
-    /// Counts what was kept since this was last called.
-    pub(super) fn count(&mut self, allowance: &Allowance) {
-        allowance.count(std::mem::take(&mut self.bytes));
-    }
-
-    /// Tags in the order that features have them.
-    pub(super) fn tags<'t>(&mut self, all: impl IntoIterator<Item = (&'t str, &'t str)>) -> Tags {
-        let mut tags: Tags = all.into_iter().map(|(key, value)| (self.keep(key), self.keep(value))).collect();
-        tags.sort();
-        tags
-    }
-}
 
 /// Whether most places can only be degrees; what nothing is said about is taken for WGS 84 then.
 pub(super) fn look_like_degrees<'v>(vertices: impl Iterator<Item = &'v Vertex>) -> bool {
@@ -139,12 +106,14 @@ impl Placing {
     }
 
     /// Whether something with this extent may lie near the area.
+    #[cfg(feature = "geoparquet")]
     pub(super) fn is_near(&self, extent: &Extent) -> bool {
         self.turned(extent).is_some()
     }
 
     /// Whether a shape may lie near the area, or has something that is to be told; counts one that does not.
-    pub(super) fn is_shape_near(&mut self, shape: &RawShape) -> bool {
+    #[cfg(feature = "geoparquet")]
+    pub(super) fn is_shape_near(&mut self, shape: &super::raw::RawShape) -> bool {
         let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
         let is_odd = shape.parts.is_empty() || shape.vertices().any(|vertex| !self.is_on_earth(vertex));
         if is_odd || self.is_near(&extent) {

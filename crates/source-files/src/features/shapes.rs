@@ -1,10 +1,10 @@
 //! Lines and polygons from a Shapefile, with the columns of the table beside it as tags.
 
 use super::clip::Vertex;
-use super::columns::{Table, with_packed_tags};
+use super::columns::{Table, Texts, with_packed_tags};
 use super::model::{Done, FeatureFile, Wanted, file_name};
 use super::nest;
-use super::placing::{LEFT_OUT, Placing, Texts, look_like_degrees};
+use super::placing::{LEFT_OUT, Placing, look_like_degrees};
 use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::crs::Crs;

@@ -28,6 +28,7 @@ use parquet::schema::types::Type;
 
 use crate::SourceError;
 use crate::crs::Crs;
+use crate::error::at_most;
 use crate::features::clip::Extent;
 use crate::limits::PARQUET_FOOTER_BYTES_MAX;
 use geo::Geo;
@@ -79,10 +80,7 @@ impl GeoParquet {
             return Err(broken(path, "no mark at its end".into(), "a whole file, not encrypted"));
         }
         let footer_len = u64::from(u32::from_le_bytes([a, b, c, d]));
-        if PARQUET_FOOTER_BYTES_MAX < footer_len {
-            let (what, limit) = ("bytes of a footer", PARQUET_FOOTER_BYTES_MAX);
-            return Err(SourceError::TooLarge { path: path.into(), what, found: footer_len, limit });
-        }
+        at_most(path, footer_len, PARQUET_FOOTER_BYTES_MAX, "bytes of a footer")?;
         if len - whole < footer_len {
             return Err(broken(path, format!("a footer of {footer_len} bytes"), "one that fits into the file"));
         }
@@ -107,31 +105,9 @@ impl GeoParquet {
             found: "a Parquet file that is no GeoParquet: nothing in it says which column holds geometries".into(),
         })?;
         let mut geo = Geo::read(text).map_err(|(found, expected)| broken(path, found, expected))?;
-        let file = Self::has_sound_groups(path, len, &metadata)?;
-        geo.boxes = geo.boxes.or_else(|| boxes_of(file));
+        check_groups(path, len, &metadata)?;
+        geo.boxes = geo.boxes.or_else(|| boxes_of(metadata.file_metadata().schema()));
         Ok(Self { path: path.into(), len, metadata, geo })
-    }
-
-    /// Refuses row groups that lie outside the file or have more rows than it can hold; the schema of others.
-    fn has_sound_groups<'m>(path: &Path, len: u64, metadata: &'m ParquetMetaData) -> Result<&'m Type, SourceError> {
-        let (mut rows, mut number) = (0_u64, 0);
-        for group in metadata.row_groups() {
-            rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
-            for column in group.columns() {
-                let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
-                let [start, size] = [start, column.compressed_size()].map(|number| u64::try_from(number).ok());
-                let end = start.zip(size).and_then(|(start, size)| start.checked_add(size));
-                if end.is_none_or(|end| len < end) || column.file_path().is_some() {
-                    return Err(broken(path, format!("row group {number}, which lies outside the file"), "one inside"));
-                }
-            }
-            number += 1;
-        }
-        // Each row has a geometry, of which none is packed to less than a byte.
-        match rows <= len {
-            true => Ok(metadata.file_metadata().schema()),
-            false => Err(broken(path, format!("{rows} rows in {len} bytes"), "fewer rows than bytes")),
-        }
     }
 
     /// The file, for messages.
@@ -258,6 +234,28 @@ impl GeoParquet {
         }
         let metadata = ParquetMetaData::new(first.metadata.file_metadata().clone(), groups);
         ParquetMetaDataWriter::new_with_tracked(out, &metadata).finish().map_err(io::Error::other)
+    }
+}
+
+/// Refuses row groups that lie outside the file or have more rows than it can hold.
+fn check_groups(path: &Path, len: u64, metadata: &ParquetMetaData) -> Result<(), SourceError> {
+    let (mut rows, mut number) = (0_u64, 0);
+    for group in metadata.row_groups() {
+        rows = rows.saturating_add(u64::try_from(group.num_rows()).unwrap_or(u64::MAX));
+        for column in group.columns() {
+            let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+            let [start, size] = [start, column.compressed_size()].map(|number| u64::try_from(number).ok());
+            let end = start.zip(size).and_then(|(start, size)| start.checked_add(size));
+            if end.is_none_or(|end| len < end) || column.file_path().is_some() {
+                return Err(broken(path, format!("row group {number}, which lies outside the file"), "one inside"));
+            }
+        }
+        number += 1;
+    }
+    // Each row has a geometry, of which none is packed to less than a byte.
+    match rows <= len {
+        true => Ok(()),
+        false => Err(broken(path, format!("{rows} rows in {len} bytes"), "fewer rows than bytes")),
     }
 }
 

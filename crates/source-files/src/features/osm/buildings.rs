@@ -12,8 +12,9 @@ use super::texts::{KnownTexts, wanted_texts};
 use crate::SourceError;
 use crate::allowance::Allowance;
 use crate::features::clip::Extent;
+use crate::features::columns::Texts;
 use crate::features::model::{BUILDING_KEY, Tags, VectorFeature};
-use crate::features::placing::{Placing, Texts};
+use crate::features::placing::Placing;
 
 /// Keys that say how high a building is. No others are kept: most buildings have an address.
 const KEYS: [&str; 5] = [BUILDING_KEY, "height", "building:levels", "min_height", "building:min_level"];

@@ -6,6 +6,7 @@ use flate2::bufread::ZlibDecoder;
 
 use super::wire::{Fault, Fields};
 use crate::SourceError;
+use crate::error::at_most;
 use crate::limits::{OSM_BLOCK_BYTES_MAX, OSM_HEAD_BYTES_MAX};
 use crate::store::{Handle, Store};
 
@@ -83,15 +84,7 @@ impl<'a> Frames<'a> {
                 _ => {}
             }
         }
-        if OSM_BLOCK_BYTES_MAX < packed_bytes {
-            let (found, limit) = (packed_bytes, OSM_BLOCK_BYTES_MAX);
-            return Err(SourceError::TooLarge {
-                path: self.store.path().into(),
-                what: "bytes in a block",
-                found,
-                limit,
-            });
-        }
+        at_most(self.store.path(), packed_bytes, OSM_BLOCK_BYTES_MAX, "bytes in a block")?;
         let packed_at = at + 4 + length;
         self.store.holds(&format!("block {index} (byte {at})"), packed_at + packed_bytes)?;
         Ok(Frame { index, begins_at: at, packed_at, packed_bytes, kind })

@@ -21,8 +21,9 @@ use std::sync::Arc;
 
 use terrain::Each;
 
+use super::columns::Texts;
 use super::model::{FeatureFile, Tags, Wanted};
-use super::placing::{LEFT_OUT, Placing, Texts};
+use super::placing::{LEFT_OUT, Placing};
 use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
 use crate::allowance::Allowance;

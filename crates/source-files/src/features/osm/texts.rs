@@ -4,8 +4,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use super::block::Block;
+use crate::features::columns::Texts;
 use crate::features::model::Tags;
-use crate::features::placing::Texts;
 
 /// Which texts of a block are wanted keys.
 pub(super) fn wanted_texts(block: &Block, keys: &[&str]) -> Vec<bool> {
