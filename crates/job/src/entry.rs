@@ -60,6 +60,11 @@ impl<'a> Section<'a> {
         entry.table()
     }
 
+    /// A table of this one that the job leaves out.
+    pub fn absent(&self, key: &str) -> Self {
+        Self { document: self.document, name: self.key(key), offset: self.offset, table: None }
+    }
+
     /// Whether the job has it.
     pub fn is_there(&self) -> bool {
         self.table.is_some()
@@ -89,6 +94,20 @@ impl<'a> Section<'a> {
     pub fn optional(&self, key: &str) -> Option<Entry<'a>> {
         let (name, value) = self.table?.iter().find(|(name, _)| name.get_ref() == key)?;
         Some(Entry { document: self.document, key: self.key(key), offset: name.span().start, value })
+    }
+
+    /// What `read` makes of the value of `key`, if the job has one.
+    pub fn maybe<T>(
+        &self,
+        key: &str,
+        read: impl FnOnce(&Entry<'a>) -> Result<T, JobError>,
+    ) -> Result<Option<T>, JobError> {
+        self.optional(key).map(|entry| read(&entry)).transpose()
+    }
+
+    /// The text of `key`, if the job has one.
+    pub fn text(&self, key: &str) -> Result<Option<String>, JobError> {
+        self.maybe(key, |entry| entry.prose(|c| c == '\0'))
     }
 
     /// The value of `key`.
@@ -342,6 +361,12 @@ impl<'a> Entry<'a> {
             }
             JobError::UnknownWord(fault)
         })
+    }
+
+    /// The items of a list of so many.
+    pub fn items_of(&self, counts: RangeInclusive<usize>) -> Result<Vec<Entry<'a>>, JobError> {
+        let items = self.list()?;
+        if counts.contains(&items.len()) { Ok(items) } else { Err(self.out_of_range(self.expected())) }
     }
 
     /// The items of a list.

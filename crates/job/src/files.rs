@@ -10,6 +10,7 @@ use std::fs;
 use std::path::{Component, MAIN_SEPARATOR, Path, PathBuf};
 
 use crate::bounds::{FEATURE_SOURCES_MAX, SOURCES_MAX, VISITED_MAX};
+use crate::entry::Entry;
 use crate::{
     AreaShape, DemSource, Fault, FeatureSource, FeaturesSpec, Job, JobError, NamedFile, ObjectSource, ObjectsSpec,
     SourceFile, Start,
@@ -19,6 +20,18 @@ use crate::{
 pub(crate) struct Mention {
     pub place: Place,
     pub fault: Box<Fault>,
+}
+
+impl Mention {
+    /// Of a file or a pattern of a list; `expected` is what kind of file it is to be.
+    pub fn of_list(place: Place, item: &Entry, file: &NamedFile, expected: &str) -> Result<Self, JobError> {
+        if has_wildcard(&file.written) && leaves_after_wildcard(&file.written) {
+            let mut fault = item.fault("a pattern without .. behind its first wildcard");
+            fault.hint = format!("name the folder first: sources = [\"../other/{}\"]", place.pattern());
+            return Err(JobError::LeavesFolder(fault));
+        }
+        Ok(Self { place, fault: item.fault(expected) })
+    }
 }
 
 /// Which list of the job names the file, and where in it.
@@ -42,12 +55,12 @@ impl Place {
 }
 
 /// Whether a name is a pattern.
-pub(crate) fn has_wildcard(written: &str) -> bool {
+fn has_wildcard(written: &str) -> bool {
     written.contains(['*', '?', '['])
 }
 
 /// Whether a pattern goes up a folder behind its first wildcard.
-pub(crate) fn leaves_after_wildcard(written: &str) -> bool {
+fn leaves_after_wildcard(written: &str) -> bool {
     let (_, rest) = split_pattern(written);
     rest.components().any(|part| part == Component::ParentDir)
 }
@@ -119,8 +132,7 @@ pub(crate) fn locate_sources(source: &mut DemSource, folder: &Path, mentions: &[
         // A file that two entries find keeps the higher priority.
         found.extend(more.into_iter().filter(|file| seen.insert(file.path.clone())));
         if SOURCES_MAX < found.len() {
-            let expected = format!("at most {SOURCES_MAX} files");
-            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(*mention.fault).clone() })));
+            return Err(too_many(SOURCES_MAX, &mention.fault));
         }
     }
     *files = found;
@@ -129,51 +141,54 @@ pub(crate) fn locate_sources(source: &mut DemSource, folder: &Path, mentions: &[
 
 /// Checks every file of `features.sources` and expands its patterns.
 fn locate_features(features: &mut FeaturesSpec, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
-    let mut found = Vec::new();
-    for (index, source) in features.sources.iter().enumerate() {
-        let FeatureSource::File { file, layer, kind, crs } = source else {
-            found.push(source.clone());
-            continue;
-        };
-        let mention = mentions.iter().find(|mention| matches!(mention.place, Place::Features(at) if at == index));
-        let mention = mention.expect("every file is mentioned");
-        for file in named_files(file, folder, mention)? {
-            let source = FeatureSource::File { file, layer: layer.clone(), kind: *kind, crs: crs.clone() };
-            // What two entries find, with nothing else said of it, counts once.
-            if !found.contains(&source) {
-                found.push(source);
-            }
-        }
-        if FEATURE_SOURCES_MAX < found.len() {
-            let expected = format!("at most {FEATURE_SOURCES_MAX} files");
-            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(*mention.fault).clone() })));
-        }
-    }
-    features.sources = found;
+    let mention = |index| mentions.iter().find(|mention| mention.place == Place::Features(index));
+    let expand = |index: usize, source: &FeatureSource| {
+        let FeatureSource::File { file, layer, kind, crs } = source else { return Ok(vec![source.clone()]) };
+        let files = named_files(file, folder, mention(index).expect("every file is mentioned"))?.into_iter();
+        let source = |file| FeatureSource::File { file, layer: layer.clone(), kind: *kind, crs: crs.clone() };
+        Ok(files.map(source).collect())
+    };
+    features.sources = expanded(&features.sources, expand, mention)?;
     Ok(())
 }
 
 /// Checks every file of `objects.sources` and expands its patterns. What is taken over from features may be patterns
 /// whose files are checked there already.
 fn locate_objects(objects: &mut ObjectsSpec, folder: &Path, mentions: &[Mention]) -> Result<(), JobError> {
-    let mut found: Vec<ObjectSource> = Vec::new();
-    for (index, source) in objects.sources.iter().enumerate() {
-        let own = mentions.iter().find(|mention| matches!(mention.place, Place::Objects(at) if at == index));
-        let of_features = || mentions.iter().find(|mention| matches!(mention.place, Place::Features(_)));
-        let mention = own.or_else(of_features).expect("every file is mentioned");
-        for file in named_files(&source.file, folder, mention)? {
-            let source = ObjectSource { file, ..source.clone() };
+    let mention = |index| {
+        let own = mentions.iter().find(|mention| mention.place == Place::Objects(index));
+        own.or_else(|| mentions.iter().find(|mention| matches!(mention.place, Place::Features(_))))
+    };
+    let expand = |index: usize, source: &ObjectSource| {
+        let files = named_files(&source.file, folder, mention(index).expect("every file is mentioned"))?.into_iter();
+        Ok(files.map(|file| ObjectSource { file, ..source.clone() }).collect())
+    };
+    objects.sources = expanded(&objects.sources, expand, mention)?;
+    Ok(())
+}
+
+/// What `expand` makes of each source. What two of them find, with nothing else said of it, counts once.
+fn expanded<'m, T: PartialEq>(
+    sources: &[T],
+    expand: impl Fn(usize, &T) -> Result<Vec<T>, JobError>,
+    mention: impl Fn(usize) -> Option<&'m Mention>,
+) -> Result<Vec<T>, JobError> {
+    let mut found: Vec<T> = Vec::new();
+    for (index, source) in sources.iter().enumerate() {
+        for source in expand(index, source)? {
             if !found.contains(&source) {
                 found.push(source);
             }
         }
-        if FEATURE_SOURCES_MAX < found.len() {
-            let expected = format!("at most {FEATURE_SOURCES_MAX} files");
-            return Err(JobError::OutOfRange(Box::new(Fault { expected, ..(*mention.fault).clone() })));
+        if let Some(mention) = mention(index).filter(|_| FEATURE_SOURCES_MAX < found.len()) {
+            return Err(too_many(FEATURE_SOURCES_MAX, &mention.fault));
         }
     }
-    objects.sources = found;
-    Ok(())
+    Ok(found)
+}
+
+fn too_many(most: usize, fault: &Fault) -> JobError {
+    JobError::OutOfRange(Box::new(Fault { expected: format!("at most {most} files"), ..fault.clone() }))
 }
 
 /// The files that one entry of `dem.sources` stands for.

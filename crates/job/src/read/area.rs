@@ -16,7 +16,7 @@ pub(super) type Find<'a> = dyn FnMut(&AreaRequest, &Entry) -> Result<AreaFound, 
 
 pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result<(Area, ModulesSpec), JobError> {
     let name = area.required("name")?.name("the database is named after it: NAME.tdb")?;
-    let title = title(area)?;
+    let title = area.maybe("title", |entry| entry.prose(char::is_control))?;
     let epsg = epsg(area)?;
     let place = open_place(area, epsg)?;
     let origin_m = if place.is_none() { origin(area)? } else { [0.0; 2] };
@@ -77,12 +77,6 @@ fn open_place<'a>(area: &Section<'a>, epsg: Option<u32>) -> Result<Option<(Entry
             Ok(Some((entry, AreaPlace::Around { latitude, longitude, size_m })))
         }
     }
-}
-
-/// What a page of the area is called: one line of text.
-fn title(area: &Section) -> Result<Option<String>, JobError> {
-    let Some(entry) = area.optional("title") else { return Ok(None) };
-    entry.prose(char::is_control).map(Some)
 }
 
 /// The code; `None` for one that is to be found.

@@ -4,18 +4,18 @@ use std::path::Path;
 
 use crate::bounds::{GEOIDS_MAX, SOURCES_MAX};
 use crate::entry::{Entry, Section};
-use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
+use crate::files::{Mention, Place};
 use crate::{
     DemSource, DemSpec, GeoidSpec, JobError, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids, usual_text,
 };
 
 pub(super) fn read(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<DemSpec, JobError> {
-    let unit_m = unit(dem)?;
+    let unit_m = dem.maybe("height_unit_m", Entry::number)?;
     let source = source(dem, job, unit_m, mentions)?;
     if let (Some(entry), DemSource::Sample { .. }) = (dem.optional("height_unit_m"), &source) {
         return Err(entry.conflict("source = \"sample\"", "no unit, since the sample is in metres", "remove it"));
     }
-    let vertical_datum = dem.optional("vertical_datum").map(|entry| entry.prose(char::is_control)).transpose()?;
+    let vertical_datum = dem.maybe("vertical_datum", |entry| entry.prose(char::is_control))?;
     let (voids, next_source) = voids(dem)?;
     let (resampling, feather_m) = (dem.word("resampling")?, dem.number("feather_m")?);
     let geoids = geoids(dem, job, mentions)?;
@@ -26,12 +26,8 @@ pub(super) fn read(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Re
 /// Grids for converting between vertical datums.
 fn geoids(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec<GeoidSpec>, JobError> {
     let Some(entry) = dem.optional("geoids") else { return Ok(Vec::new()) };
-    let items = entry.list()?;
-    if GEOIDS_MAX < items.len() {
-        return Err(entry.out_of_range(entry.expected()));
-    }
     let mut geoids = Vec::new();
-    for item in items {
+    for item in entry.items_of(0..=GEOIDS_MAX)? {
         let table = item.table()?;
         let name = table.required("datum")?;
         let datum = name.prose(char::is_control)?.trim().to_owned();
@@ -44,11 +40,6 @@ fn geoids(dem: &Section, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec<
         geoids.push(GeoidSpec { datum, file: file.file(job)? });
     }
     Ok(geoids)
-}
-
-/// Metres in a unit of height.
-fn unit(table: &Section) -> Result<Option<f64>, JobError> {
-    table.optional("height_unit_m").map(|entry| entry.number()).transpose()
 }
 
 fn source(dem: &Section, job: &Path, unit_m: Option<f64>, mentions: &mut Vec<Mention>) -> Result<DemSource, JobError> {
@@ -74,19 +65,10 @@ fn source(dem: &Section, job: &Path, unit_m: Option<f64>, mentions: &mut Vec<Men
 }
 
 fn sources(entry: &Entry, job: &Path, unit_m: Option<f64>, mentions: &mut Vec<Mention>) -> Result<DemSource, JobError> {
-    let items = entry.list()?;
-    if items.is_empty() || SOURCES_MAX < items.len() {
-        return Err(entry.out_of_range(entry.expected()));
-    }
     let (mut written, mut files) = (Vec::new(), Vec::new());
-    for item in &items {
+    for item in &entry.items_of(1..=SOURCES_MAX)? {
         let (file, said) = source_entry(item, job)?;
-        if has_wildcard(&file.written) && leaves_after_wildcard(&file.written) {
-            let mut fault = item.fault("a pattern without .. behind its first wildcard");
-            fault.hint = "name the folder first: sources = [\"../other/*.tif\"]".to_owned();
-            return Err(JobError::LeavesFolder(fault));
-        }
-        mentions.push(Mention { place: Place::Source(files.len()), fault: item.fault("a raster file") });
+        mentions.push(Mention::of_list(Place::Source(files.len()), item, &file, "a raster file")?);
         let said = SourceSaid { height_unit_m: said.height_unit_m.or(unit_m), ..said };
         written.push(SourceEntry { name: file.written.clone(), said: said.clone() });
         files.push(SourceFile { written: file.written, path: file.path, said });
@@ -101,18 +83,17 @@ fn source_entry(item: &Entry, job: &Path) -> Result<(NamedFile, SourceSaid), Job
     }
     let table = item.table()?;
     let file = table.required("file")?.file(job)?;
-    let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();
-    let corner = table.optional("corner").map(|entry| match entry.pair()? {
+    let corner = |entry: &Entry| match entry.pair()? {
         pair @ [latitude, longitude] if latitude.abs() <= 90.0 && longitude.abs() <= 180.0 => Ok(pair),
         _ => Err(entry.out_of_range(entry.expected())),
-    });
+    };
     let said = SourceSaid {
-        crs: text("crs")?,
-        corner: corner.transpose()?,
-        height_unit_m: unit(&table)?,
-        nodata: table.optional("nodata").map(|entry| entry.number()).transpose()?,
-        vertical_datum: text("vertical_datum")?,
-        attribution: text("attribution")?,
+        crs: table.text("crs")?,
+        corner: table.maybe("corner", corner)?,
+        height_unit_m: table.maybe("height_unit_m", Entry::number)?,
+        nodata: table.maybe("nodata", Entry::number)?,
+        vertical_datum: table.text("vertical_datum")?,
+        attribution: table.text("attribution")?,
     };
     Ok((file, said))
 }

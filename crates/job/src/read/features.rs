@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use features::{Clearances, FallOptions, Form, GradeOptions, Rule, RuleKind};
+use features::{Clearances, FallOptions, GradeOptions, Rule, RuleKind};
 use terrain::HOLE_CLASS;
 
 use crate::bounds::{FEATURE_SOURCES_MAX, NAME_CHARS_MAX, RULES_MAX, TAG_CHARS_MAX, TAGS_MAX};
 use crate::entry::{Entry, Section};
-use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
+use crate::files::{Mention, Place};
 use crate::{
     DemSource, Edges, FeatureSource, FeaturesSpec, HOLE_CLASS_NAME, HeightsFrom, ImportanceSpec, JobError, MethodName,
 };
@@ -27,7 +27,7 @@ pub(super) fn read(
     }
     let sources = sources(&features.required("sources")?, dem, job, mentions)?;
     let rules = features.optional("rules");
-    let smooth_posts = features.optional("smooth_posts").map(|entry| entry.number()).transpose()?;
+    let smooth_posts = features.maybe("smooth_posts", Entry::number)?;
     let spec = FeaturesSpec {
         sources,
         rules: rules.as_ref().map_or(Ok(Vec::new()), |rules| read_rules(rules, importance))?,
@@ -116,13 +116,8 @@ fn sources(
             }
             FeatureSource::Sample => {}
             FeatureSource::File { file, .. } => {
-                if has_wildcard(&file.written) && leaves_after_wildcard(&file.written) {
-                    let mut fault = item.fault("a pattern without .. behind its first wildcard");
-                    fault.hint = "name the folder first: sources = [\"../other/*.gpkg\"]".to_owned();
-                    return Err(JobError::LeavesFolder(fault));
-                }
-                let fault = item.fault("a file of lines and polygons");
-                mentions.push(Mention { place: Place::Features(sources.len()), fault });
+                let place = Place::Features(sources.len());
+                mentions.push(Mention::of_list(place, item, file, "a file of lines and polygons")?);
             }
         }
         sources.push(source);
@@ -134,9 +129,8 @@ fn sources(
 fn source(item: &Entry, dem: &DemSource, job: &Path) -> Result<FeatureSource, JobError> {
     if item.is_table() {
         let table = item.table()?;
-        let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();
-        let (layer, crs) = (text("layer")?, text("crs")?);
-        let kind = table.optional("kind").map(|kind| kind.word()).transpose()?;
+        let (layer, crs) = (table.text("layer")?, table.text("crs")?);
+        let kind = table.maybe("kind", Entry::word)?;
         return Ok(FeatureSource::File { file: table.required("file")?.file(job)?, layer, kind, crs });
     }
     match (item.text()?, dem) {
@@ -151,32 +145,27 @@ fn source(item: &Entry, dem: &DemSource, job: &Path) -> Result<FeatureSource, Jo
 }
 
 fn read_rules(entry: &Entry, importance: &ImportanceSpec) -> Result<Vec<Rule>, JobError> {
-    let items = entry.list()?;
-    if RULES_MAX < items.len() {
-        return Err(entry.out_of_range(entry.expected()));
-    }
-    items.iter().map(|item| rule(item, importance)).collect()
+    entry.items_of(0..=RULES_MAX)?.iter().map(|item| rule(item, importance)).collect()
 }
 
 fn rule(item: &Entry, importance: &ImportanceSpec) -> Result<Rule, JobError> {
     let table = item.table()?;
     let tags = tags(&table.required("where")?)?;
-    let kind = table.optional("kind").map_or(Ok(RuleKind::AsBuiltIn), |kind| kind.word())?;
+    let kind = table.maybe("kind", Entry::word)?.unwrap_or(RuleKind::AsBuiltIn);
     let others = ["class", "width_m", "grade_max_percent", "grade_give", "form", "z"].into_iter();
     if let (RuleKind::None, Some(other)) = (kind, others.clone().find_map(|key| table.optional(key))) {
         let hint = "remove it, or write another kind";
         return Err(other.conflict("kind = \"none\"", "no more keys, since these features are left out", hint));
     }
-    let number = |key: &str| table.optional(key).map(|entry| entry.number()).transpose();
     let heights: HeightsFrom = table.word("z")?;
     Ok(Rule {
         tags,
         kind,
-        class: table.optional("class").map(|entry| class(&entry, importance)).transpose()?,
-        width_m: number("width_m")?,
-        grade_max_percent: number("grade_max_percent")?,
-        grade_give: number("grade_give")?,
-        form: table.optional("form").map(|entry| entry.word::<Form>()).transpose()?,
+        class: table.maybe("class", |entry| class(entry, importance))?,
+        width_m: table.maybe("width_m", Entry::number)?,
+        grade_max_percent: table.maybe("grade_max_percent", Entry::number)?,
+        grade_give: table.maybe("grade_give", Entry::number)?,
+        form: table.maybe("form", Entry::word)?,
         pins: heights == HeightsFrom::Feature,
     })
 }

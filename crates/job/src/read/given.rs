@@ -11,8 +11,8 @@ pub(super) fn read(
     job: &Path,
     mentions: &mut Vec<Mention>,
 ) -> Result<(Option<Start>, Option<NamedFile>), JobError> {
-    let start = tin.optional("start").map(|entry| start(&entry, job, mentions)).transpose()?;
-    let pins = tin.optional("pins").map(|entry| file(&entry, job, Place::Pins, mentions)).transpose()?;
+    let start = tin.maybe("start", |entry| start(entry, job, mentions))?;
+    let pins = tin.maybe("pins", |entry| file(entry, job, Place::Pins, mentions))?;
     Ok((start, pins))
 }
 

@@ -25,11 +25,7 @@ pub(super) fn read(
     let smooth = importance.word("smooth")?;
     let mut spec = ImportanceSpec { default_weight, areas: vec![], classes: vec![DEFAULT_CLASS.to_owned()], smooth };
     let Some(areas) = importance.optional("areas") else { return Ok(spec) };
-    let items = areas.list()?;
-    if AREAS_MAX < items.len() {
-        return Err(areas.out_of_range(areas.expected()));
-    }
-    for item in &items {
+    for item in &areas.items_of(0..=AREAS_MAX)? {
         let table = item.table()?;
         let shape = shape(item, &table, dem, job)?;
         if let Some(file) = table.optional("file").or_else(|| table.optional("raster")) {
@@ -70,7 +66,7 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
     match (file, raster, sample) {
         (Some(file), None, None) => match value {
             Some(value) => Err(value.conflict("file", "no value, since polygons have none", "value goes with raster")),
-            None => polygons(&file, job),
+            None => Ok(AreaShape::Polygons { file: file.file(job)? }),
         },
         (None, Some(raster), None) => {
             let value = table.required("value")?.signed()?;
@@ -109,17 +105,13 @@ pub(super) fn water(
     }
     let table = entry.table()?;
     let file = table.required("file")?.file(job)?;
-    let level_m = table.optional("level_m").map(|level| level.number()).transpose()?;
+    let level_m = table.maybe("level_m", Entry::number)?;
     let class = match table.optional("class") {
         Some(_) => class(&table, &mut spec.classes)?,
         None => class_index(&entry, WATER_CLASS, &mut spec.classes)?,
     };
-    let weight = table.optional("weight").map(|entry| weight(&entry)).transpose()?;
+    let weight = table.maybe("weight", weight)?;
     Ok(Some(WaterSpec { file, level_m, class, weight }))
-}
-
-fn polygons(entry: &Entry, job: &Path) -> Result<AreaShape, JobError> {
-    Ok(AreaShape::Polygons { file: entry.file(job)? })
 }
 
 fn sample_class(entry: &Entry, dem: &DemSource) -> Result<AreaShape, JobError> {

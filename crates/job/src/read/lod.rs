@@ -5,7 +5,7 @@ use crate::entry::{Entry, Section};
 use crate::{FeaturesSpec, JobError, LodSpec};
 
 pub(super) fn read(lod: &Section, features: Option<&FeaturesSpec>) -> Result<LodSpec, JobError> {
-    let inner_shares = lod.optional("levels").map_or(Ok(Vec::new()), |entry| inner_shares(&entry))?;
+    let inner_shares = lod.maybe("levels", inner_shares)?.unwrap_or_default();
     let border = match lod.optional("border") {
         Some(entry) if inner_shares.is_empty() => {
             let hint = "it says what coarser levels keep of the sides: add levels, or leave it out";

@@ -8,7 +8,7 @@ use terrain::ObjectKind;
 use super::features::tags;
 use crate::bounds::{FEATURE_SOURCES_MAX, RULES_MAX};
 use crate::entry::{Entry, Section};
-use crate::files::{Mention, Place, has_wildcard, leaves_after_wildcard};
+use crate::files::{Mention, Place};
 use crate::{Edges, FeatureSource, FeaturesSpec, JobError, NamedFile, ObjectSource, ObjectsSpec, usual_text};
 
 pub(super) fn read(
@@ -24,11 +24,10 @@ pub(super) fn read(
         Some(entry) => sources(&entry, job, mentions)?,
         None => of_features(objects, features)?,
     };
-    let rules = objects.optional("rules").map_or(Ok(Vec::new()), |rules| read_rules(&rules))?;
-    let limits = objects.optional("limits").map(|limits| limits.table()).transpose()?;
-    let limit = |key: &str| match &limits {
-        Some(limits) => limits.whole_u32(key),
-        None => Ok(usual_text(&format!("objects.limits.{key}")).parse().expect("what holds is a whole number")),
+    let rules = objects.maybe("rules", read_rules)?.unwrap_or_default();
+    let limits = match objects.optional("limits") {
+        Some(limits) => limits.table()?,
+        None => objects.absent("limits"),
     };
     Ok(Some(ObjectsSpec {
         sources,
@@ -37,9 +36,9 @@ pub(super) fn read(
             corners_max: objects.whole("corners_max")? as usize,
             area_min_m2: objects.number("area_min_m2")?,
         },
-        per_load_module: limit("per_load_module")?,
-        per_4km_square: limit("per_4km_square")?,
-        joint: limits.as_ref().map_or(Ok(false), |limits| limits.flag("joint"))?,
+        per_load_module: limits.whole_u32("per_load_module")?,
+        per_4km_square: limits.whole_u32("per_4km_square")?,
+        joint: limits.flag("joint")?,
     }))
 }
 
@@ -82,20 +81,11 @@ fn of_features(objects: &Section, features: Option<&FeaturesSpec>) -> Result<Vec
 }
 
 fn sources(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Vec<ObjectSource>, JobError> {
-    let items = entry.list()?;
-    if items.is_empty() || FEATURE_SOURCES_MAX < items.len() {
-        return Err(entry.out_of_range(entry.expected()));
-    }
     let mut sources = Vec::new();
-    for item in &items {
+    for item in &entry.items_of(1..=FEATURE_SOURCES_MAX)? {
         let source = source(item, job)?;
-        if has_wildcard(&source.file.written) && leaves_after_wildcard(&source.file.written) {
-            let mut fault = item.fault("a pattern without .. behind its first wildcard");
-            fault.hint = "name the folder first: sources = [\"../other/*.gpkg\"]".to_owned();
-            return Err(JobError::LeavesFolder(fault));
-        }
-        let fault = item.fault("a file of polygons and lines");
-        mentions.push(Mention { place: Place::Objects(sources.len()), fault });
+        let place = Place::Objects(sources.len());
+        mentions.push(Mention::of_list(place, item, &source.file, "a file of polygons and lines")?);
         sources.push(source);
     }
     Ok(sources)
@@ -113,35 +103,30 @@ fn source(item: &Entry, job: &Path) -> Result<ObjectSource, JobError> {
         return Ok(plain(item.file(job)?));
     }
     let table = item.table()?;
-    let text = |key: &str| table.optional(key).map(|entry| entry.prose(|c| c == '\0')).transpose();
     Ok(ObjectSource {
         file: table.required("file")?.file(job)?,
-        layer: text("layer")?,
-        kind: table.optional("kind").map(|kind| kind.word()).transpose()?,
-        height: text("height")?,
-        crs: text("crs")?,
+        layer: table.text("layer")?,
+        kind: table.maybe("kind", Entry::word)?,
+        height: table.text("height")?,
+        crs: table.text("crs")?,
         least_m: table.number("least_m")?,
         cell_m: table.number("cell_m")?,
     })
 }
 
 fn read_rules(entry: &Entry) -> Result<Vec<ObjectRule>, JobError> {
-    let items = entry.list()?;
-    if RULES_MAX < items.len() {
-        return Err(entry.out_of_range(entry.expected()));
-    }
-    items.iter().map(rule).collect()
+    entry.items_of(0..=RULES_MAX)?.iter().map(rule).collect()
 }
 
 fn rule(item: &Entry) -> Result<ObjectRule, JobError> {
     let table = item.table()?;
     let tags = tags(&table.required("where")?)?;
-    let kind = table.optional("kind").map(|kind| kind_of(&kind)).transpose()?;
+    let kind = table.maybe("kind", kind_of)?;
     if let (Some(None), Some(other)) = (kind, table.optional("height_m")) {
         let hint = "remove it, or write another kind";
         return Err(other.conflict("kind = \"none\"", "no more keys, since these objects are left out", hint));
     }
-    Ok(ObjectRule { tags, kind, height_m: table.optional("height_m").map(|entry| entry.number()).transpose()? })
+    Ok(ObjectRule { tags, kind, height_m: table.maybe("height_m", Entry::number)? })
 }
 
 fn kind_of(entry: &Entry) -> Result<Option<ObjectKind>, JobError> {

@@ -5,7 +5,7 @@
 use terrain::QUANTA_PER_METRE;
 
 use crate::bounds::{EYE_M, QUANTUM_M_MAX, RESIDUAL_M_MAX};
-use crate::entry::Section;
+use crate::entry::{Entry, Section};
 use crate::{
     Allocation, Budget, Choice, Edges, Effort, ErrorKey, JobError, Method, MethodName, NamedFile, Optimising,
     Proximity, Sight, Start, TinSpec, keys,
@@ -28,8 +28,8 @@ pub(super) fn read(
             Method::Optimised(Optimising { effort, height_fit, lattice, sight: sight(tin, effort)? })
         }
     };
-    let residual = |key| tin.optional(key).map(|entry| entry.number()).transpose();
-    let (max_residual_m, target_rms_m) = (residual("max_residual_m")?, residual("target_rms_m")?);
+    let max_residual_m = tin.maybe("max_residual_m", Entry::number)?;
+    let target_rms_m = tin.maybe("target_rms_m", Entry::number)?;
     let budget = match tin.optional("points") {
         Some(entry) => Budget::Points(entry.whole()?),
         None => Budget::Limits,
@@ -136,7 +136,7 @@ fn residual_quantum(tin: &Section, name: MethodName) -> Result<u32, JobError> {
 
 fn sight(tin: &Section, effort: Effort) -> Result<Option<Sight>, JobError> {
     let said = ["sight_eyes_m", "sight_range_m"].into_iter().find_map(|key| tin.optional(key));
-    let asked = tin.optional("sight").map(|entry| entry.flag()).transpose()?;
+    let asked = tin.maybe("sight", Entry::flag)?;
     match (asked.unwrap_or(Sight::is_usual_with(effort)), said) {
         (false, Some(entry)) => {
             let (beside, hint) = match asked {
