@@ -8,12 +8,10 @@
 
 mod against;
 pub use against::leading;
-mod breaches;
-pub use breaches::{BreachPlaces, breaches_csv, breaches_geojson};
-mod features;
+mod map_files;
+pub use map_files::{BreachPlaces, breaches_csv, breaches_geojson, features_geojson, outcome};
 mod features_text;
 mod objects_text;
-pub use features::{features_geojson, outcome};
 pub use features_text::{far_off_in_words, remarks_in_words};
 mod certificate;
 mod page;

@@ -2,7 +2,7 @@
 //! at most 80 columns.
 
 use store::{
-    Report, ReportBorder, ReportBreach, ReportEnough, ReportHeights, ReportLimit, ReportPart, ReportPlace,
+    Report, ReportBorder, ReportBound, ReportBreach, ReportEnough, ReportHeights, ReportLimit, ReportPart, ReportPlace,
     ReportResidual, ReportStage,
 };
 
@@ -92,8 +92,8 @@ fn residuals(report: &Report) -> Option<String> {
     let mut all = Table::new(&[Left, Right, Right, Right, Right, Right]);
     all.row(["Residuals in m, against", "RMS", "mean abs", "95 %", "99 %", "largest"]);
     for (words, Residual { rms_m, max_m, rest }) in against::told(report) {
-        let rest = rest.map_or_else(Default::default, |rest| metres([(rest[0], 3), (rest[1], 2), (rest[2], 2)]));
-        let [rms, largest] = metres([(rms_m, 3), (max_m, 2)]);
+        let rest = rest.map_or_else(Default::default, |rest| decimals([(rest[0], 3), (rest[1], 2), (rest[2], 2)]));
+        let [rms, largest] = decimals([(rms_m, 3), (max_m, 2)]);
         all.row([format!("  {words}"), rms].into_iter().chain(rest).chain([largest]));
     }
     let mut table = Table::new(&[Left, Right, Right, Right, Right, Right, Right, Right]);
@@ -168,13 +168,13 @@ pub(crate) fn heights_in_words(heights: &ReportHeights) -> String {
 
 fn class_row(table: &mut Table, name: &str, counts: [String; 2], residual: &ReportResidual) {
     let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
-    let figures = metres([(rms_m, 3), (mean_abs_m, 3), (p95_m, 2), (p99_m, 2), (max_m, 2)]);
+    let figures = decimals([(rms_m, 3), (mean_abs_m, 3), (p95_m, 2), (p99_m, 2), (max_m, 2)]);
     table.row([format!("  {name}")].into_iter().chain(counts).chain(figures));
 }
 
-/// Metres with so many digits.
-fn metres<const N: usize>(all: [(f64, usize); N]) -> [String; N] {
-    all.map(|(metres, digits)| format!("{metres:.digits$}"))
+/// Figures with so many digits behind the point.
+pub(crate) fn decimals<const N: usize>(all: [(f64, usize); N]) -> [String; N] {
+    all.map(|(figure, digits)| format!("{figure:.digits$}"))
 }
 
 /// Levels of detail, where there are several.
@@ -219,16 +219,7 @@ fn bound(report: &Report) -> Option<String> {
     let mut table = Table::new(&[Left, Left, Right, Right, Right, Right, Right, Right]);
     table.row(["  limit", "row,col", "count", "limit", "refused", "largest", "RMS m", "without"]);
     for bound in report.bound.iter().take(BOUND_ROWS_MAX) {
-        table.row([
-            format!("  {}", bound.kind),
-            place(bound.place),
-            grouped(bound.count),
-            grouped(bound.limit),
-            grouped(u64::from(bound.refused)),
-            format!("{:.2}", bound.refused_largest_m),
-            format!("{:.3}", bound.rms_with_m),
-            format!("{:.3}", bound.rms_without_m),
-        ]);
+        table.row([format!("  {}", bound.kind), place(bound.place)].into_iter().chain(bound_cells(bound)));
     }
     let more = report.bound.len().saturating_sub(BOUND_ROWS_MAX);
     let rest = if more == 0 { String::new() } else { format!("  and {more} more in report.json\n") };
@@ -242,7 +233,7 @@ fn breaches(report: &Report) -> Option<String> {
     let mut table = Table::new(&[Left, Left, Right, Right, Right, Right, Right]);
     table.row(["  limit", "row,col", "count", "limit", "refused", "RMS m", "without"]);
     for breach in &report.breaches {
-        table.row(breach_row(breach));
+        table.row([format!("  {}", breach.kind), place(breach.place)].into_iter().chain(breach_cells(breach)));
     }
     Some(format!("Breaches, and the RMS residual without the limit\n{}", table.text(0)))
 }
@@ -255,16 +246,23 @@ fn place(place: ReportPlace) -> String {
     }
 }
 
-fn breach_row(breach: &ReportBreach) -> [String; 7] {
+/// What is counted, the limit, posts refused, and residuals without their place.
+pub(crate) fn breach_cells(breach: &ReportBreach) -> [String; 5] {
     [
-        format!("  {}", breach.kind),
-        place(breach.place),
         amount(breach, breach.count),
         amount(breach, breach.limit),
         breach.refused.to_string(),
         format!("{:.3}", breach.rms_with_m),
         breach.rms_without_m.map_or(String::new(), |rms_m| format!("{rms_m:.3}")),
     ]
+}
+
+/// The same of a limit that refused posts, with the largest residual among them.
+pub(crate) fn bound_cells(bound: &ReportBound) -> [String; 6] {
+    let [count, limit, refused] = [bound.count, bound.limit, u64::from(bound.refused)].map(grouped);
+    let residuals = [(bound.refused_largest_m, 2), (bound.rms_with_m, 3), (bound.rms_without_m, 3)];
+    let [largest, with, without] = decimals(residuals);
+    [count, limit, refused, largest, with, without]
 }
 
 /// A count; of a residual, which is counted in millimetres, the metres.

@@ -325,7 +325,7 @@ fn refused_text(report: &Report, module: ModuleId) -> String {
 fn settings(page: &Page) -> Markup {
     html! {
         h3 { "Settings" }
-        div.stack { (tables::table(html! { th { "Key" } th { "Value" } th { "Meaning" } }, html! {
+        div.stack { (tables::table(tables::heads(&["Key", "Value", "Meaning"], &[]), html! {
             @for setting in page.settings {
                 tr { td { code { (setting.key) } } td { code { (setting.value) } } td { (setting.meaning) } }
             }

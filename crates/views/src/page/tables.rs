@@ -10,7 +10,7 @@ use crate::features_text::{
     amounts, check_rows, clearances_in_words, cost, earthwork, is_thin, kept, remarks_in_words,
 };
 use crate::objects_text::objects_row;
-use crate::report::{border_in_words, eta_of, heights_in_words};
+use crate::report::{amount, border_in_words, bound_cells, breach_cells, decimals, eta_of, heights_in_words};
 use crate::table::grouped;
 
 pub(super) fn verdict(report: &Report) -> Markup {
@@ -55,6 +55,16 @@ pub(crate) fn table(head: Markup, rows: Markup) -> Markup {
     html! { div.wide tabindex="0" { table { thead { tr { (head) } } tbody { (rows) } } } }
 }
 
+/// Heads of columns: first those of texts, then those of figures.
+pub(super) fn heads(texts: &[&str], figures: &[&str]) -> Markup {
+    html! { @for head in texts { th { (head) } } @for head in figures { th.n { (head) } } }
+}
+
+/// Cells of columns of figures.
+fn figures(cells: impl IntoIterator<Item = String>) -> Markup {
+    html! { @for cell in cells { td.n { (cell) } } }
+}
+
 pub(super) fn limits(report: &Report, marks: &Marks) -> Markup {
     let (modules, windows) = (report.per_load_module, report.per_4km);
     let rows = [
@@ -81,19 +91,13 @@ pub(super) fn limits(report: &Report, marks: &Marks) -> Markup {
         ),
     ];
     html! {
-        (table(html! {
-            th { "Limit, in " (report.count) } th.n { "most used" } th.n { "limit" }
-            th.n { "use" } th.n { "above" }
-        }, html! {
+        (table(heads(&[&format!("Limit, in {}", report.count)], &["most used", "limit", "use", "above"]), html! {
             @for (name, used, limit, share, over) in rows {
-                tr {
-                    td { code { (name) } } td.n { (used) } td.n { (limit) }
-                    td.n { (format!("{:.1} %", 100.0 * share)) } td.n { (grouped(over)) }
-                }
+                tr { td { code { (name) } } (figures([used, limit, format!("{:.1} %", 100.0 * share), grouped(over)])) }
             }
             tr {
-                td { code { "limits.pool" } } td.n { (grouped(report.pool.used)) } td.n { (grouped(report.pool.size)) }
-                td.n {} td.n {}
+                td { code { "limits.pool" } }
+                (figures([grouped(report.pool.used), grouped(report.pool.size), String::new(), String::new()]))
             }
         }))
         p.quiet { "The fullest 9 x 9 load modules, which bound a 4 km square at any offset, hold "
@@ -118,18 +122,14 @@ fn bound(report: &Report, marks: &Marks) -> Markup {
             (format!("{:.2} m", refused.largest_m)) "."
         }
         @if !report.bound.is_empty() {
-            (table(html! { th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "refused" }
-                    th.n { "largest, m" } th.n { "RMS, m" } th.n { "RMS without the limit, m" } }, html! {
+            @let columns = ["count", "limit", "refused", "largest, m", "RMS, m", "RMS without the limit, m"];
+            (table(heads(&["Limit", "Where"], &columns), html! {
                 @for bound in report.bound.iter().take(BOUND_ROWS_MAX) {
-                    tr {
-                        td { code { (bound.kind) } } td { (marks.link(bound.place)) } td.n { (grouped(bound.count)) }
-                        td.n { (grouped(bound.limit)) } td.n { (bound.refused) }
-                        td.n { (format!("{:.2}", bound.refused_largest_m)) }
-                        td.n { (format!("{:.3}", bound.rms_with_m)) }
-                        td.n { (format!("{:.3}", bound.rms_without_m)) }
-                    }
+                    @let [count, limit, _, rest @ ..] = bound_cells(bound);
+                    @let cells = [count, limit, bound.refused.to_string()].into_iter().chain(rest);
+                    tr { td { code { (bound.kind) } } td { (marks.link(bound.place)) } (figures(cells)) }
                 }
-        }))
+            }))
             (more(report.bound.len(), BOUND_ROWS_MAX, "report.json"))
         }
     }
@@ -157,26 +157,15 @@ pub(super) fn advice(report: &Report) -> Markup {
 }
 
 pub(super) fn residuals(report: &Report) -> Markup {
-    let row = |name: &str, [posts, points]: [String; 2], [rms_m, max_m]: [f64; 2], rest: Option<[f64; 3]>| {
-        html! {
-            tr {
-                td { (name) } td.n { (posts) } td.n { (points) }
-                td.n { (format!("{rms_m:.3}")) } td.n { (format!("{max_m:.2}")) }
-                @match rest {
-                    Some([mean_abs_m, p95_m, p99_m]) => {
-                        td.n { (format!("{mean_abs_m:.3}")) } td.n { (format!("{p95_m:.2}")) }
-                        td.n { (format!("{p99_m:.2}")) }
-                    }
-                    None => @for _ in 0..3 { td.n {} }
-                }
-            }
-        }
+    let row = |name: &str, counts: [String; 2], [rms_m, max_m]: [f64; 2], rest: Option<[f64; 3]>| {
+        let rest = rest.map_or_else(Default::default, |rest| decimals([(rest[0], 3), (rest[1], 2), (rest[2], 2)]));
+        let cells = counts.into_iter().chain(decimals([(rms_m, 3), (max_m, 2)])).chain(rest);
+        html! { tr { td { (name) } (figures(cells)) } }
     };
     let posts = grouped(report.classes.iter().map(|class| class.posts).sum());
     html! {
-        (table(html! { th { "Residuals in metres, against" } th.n { "posts" } th.n { "points" }
-                th.n { "RMS" } th.n { "largest" }
-                th.n { "mean" } th.n { "95 %" } th.n { "99 %" } }, html! {
+        @let columns = ["posts", "points", "RMS", "largest", "mean", "95 %", "99 %"];
+        (table(heads(&["Residuals in metres, against"], &columns), html! {
             @for (words, Residual { rms_m, max_m, rest }) in told(report) {
                 @let all = [posts.clone(), grouped(report.points.total)];
                 @let counts = if words == WORKING { all } else { Default::default() };
@@ -184,11 +173,10 @@ pub(super) fn residuals(report: &Report) -> Markup {
             }
             @for class in &report.classes {
                 @if class.posts == 0 {
+                    @let none = ["-"; 5].map(str::to_owned);
                     tr {
                         td { "of it " (&class.name) }
-                        td.n { "-" }
-                        td.n { (grouped(class.points)) }
-                        @for _ in 0..5 { td.n { "-" } }
+                        (figures(["-".to_owned(), grouped(class.points)].into_iter().chain(none)))
                     }
                 } @else {
                     @let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = class.residual;
@@ -230,17 +218,16 @@ pub(super) fn levels(report: &Report) -> Markup {
     html! {
         @if !report.levels.is_empty() {
             h3 { "Levels of detail" }
-            (table(html! { th { "Level" } th.n { "inner vertices" } th.n { "triangles" } th.n { "of level 0" }
-                    th.n { "RMS, m" } th.n { "largest, m" } }, html! {
+            @let columns = ["inner vertices", "triangles", "of level 0", "RMS, m", "largest, m"];
+            (table(heads(&["Level"], &columns), html! {
                 @for level in &report.levels {
-                    tr {
-                        td { (level.level) } td.n { (format!("{} %", 100.0 * level.inner_share)) }
-                        td.n { (grouped(level.triangles)) }
-                        td.n { (format!("{:.1} %", 100.0 * level.triangles as f64 / finest.max(1) as f64)) }
-                        td.n { (format!("{:.3}", level.rms_m)) } td.n { (format!("{:.2}", level.max_m)) }
-                    }
+                    @let shares = [level.inner_share, level.triangles as f64 / finest.max(1) as f64];
+                    @let [inner, of_finest] = shares.map(|share| 100.0 * share);
+                    @let counts = [format!("{inner} %"), grouped(level.triangles), format!("{of_finest:.1} %")];
+                    @let residuals = decimals([(level.rms_m, 3), (level.max_m, 2)]);
+                    tr { td { (level.level) } (figures(counts.into_iter().chain(residuals))) }
                 }
-        }))
+            }))
             p.quiet { "Limits are about level 0; the others are for what is far away." }
         }
     }
@@ -249,17 +236,17 @@ pub(super) fn levels(report: &Report) -> Markup {
 /// What roads and water cost, and what must hold of them.
 pub(super) fn features(features: &ReportFeatures) -> Markup {
     let row = |name: &str, is_thin: bool, amounts: [String; 5], costs: [String; 3]| {
-        html! { tr { td.thin[is_thin] { (name) } @for cell in amounts.iter().chain(&costs) { td.n { (cell) } } } }
+        html! { tr { td.thin[is_thin] { (name) } (figures(amounts.into_iter().chain(costs))) } }
     };
+    let amount_heads = ["km", "of km wanted", "kept", "as strips, km", "lakes"];
+    let columns = [&amount_heads[..], &["triangles", "most of a load module", "most of a 4 km square"]].concat();
     html! {
-        (table(html! { th { "Class" } th.n { "km" } th.n { "of km wanted" } th.n { "kept" } th.n { "as strips, km" }
-            th.n { "lakes" }
-                th.n { "triangles" } th.n { "most of a load module" } th.n { "most of a 4 km square" } }, html! {
+        (table(heads(&["Class"], &columns), html! {
             @for class in &features.classes { (row(&class.name, is_thin(class), amounts(class), cost(&class.cost))) }
             (row("all", false, [const { String::new() }; 5], cost(&features.all)))
         }))
         p { (remarks_in_words(features)) "." }
-        (table(html! { th { "What must hold" } th { "found" } }, html! {
+        (table(heads(&["What must hold", "found"], &[]), html! {
             @for (what, found) in check_rows(&features.checks) { tr { td { (what) } td { (found) } } }
         }))
         @if let Some(words) = clearances_in_words(features) { p.quiet { "The " (words) "." } }
@@ -271,10 +258,9 @@ pub(super) fn features(features: &ReportFeatures) -> Markup {
 pub(super) fn objects(objects: &ReportObjects) -> Markup {
     let limit = |of: ReportObjectLimit| format!("{} of {}", grouped(of.max), grouped(of.limit));
     html! {
-        (table(html! { th { "Kind" } th.n { "kept" } th.n { "of" } th.n { "m2 seen from the side" } th.n { "of" }
-            th.n { "kept" } }, html! {
+        (table(heads(&["Kind"], &["kept", "of", "m2 seen from the side", "of", "kept"]), html! {
             @for [kind, numbers @ ..] in objects.kinds.iter().map(objects_row) {
-                tr { td { (kind) } @for cell in numbers { td.n { (cell) } } }
+                tr { td { (kind) } (figures(numbers)) }
             }
         }))
         p {
@@ -287,20 +273,17 @@ pub(super) fn objects(objects: &ReportObjects) -> Markup {
 
 /// What roads, rivers and lakes move, and where they lie farthest off the ground.
 fn earthworks(works: &ReportEarthworks) -> Markup {
+    let far = ["km", "% > 3 m off", "> 5 m", "> 10 m", "> 20 m", "over limit"];
     html! {
-        (table(html! { th { "Cut and fill" } th.n { "km" } th.n { "% > 3 m off" } th.n { "> 5 m" } th.n { "> 10 m" }
-            th.n { "> 20 m" } th.n { "over limit" } th.n { "cut, m3/km" } th.n { "fill, m3/km" } }, html! {
-            @for class in &works.classes {
-                tr { td { (class.name) } @for cell in earthwork(class) { td.n { (cell) } } }
-            }
+        (table(heads(&["Cut and fill"], &[&far[..], &["cut, m3/km", "fill, m3/km"]].concat()), html! {
+            @for class in &works.classes { tr { td { (class.name) } (figures(earthwork(class))) } }
         }))
         @if !works.worst.is_empty() {
             (table(html! { th { "Farthest off the ground" } th { "class" } th.n { "east" } th.n { "north" }
                 th.n { "m above" } th { "because of" } }, html! {
                 @for far in &works.worst {
-                    tr { td { (far.feature) } td { (far.class) } td.n { (format!("{:.0}", far.at_m[0])) }
-                        td.n { (format!("{:.0}", far.at_m[1])) } td.n { (format!("{:.1}", far.off_m)) }
-                        td { (far.cause) } }
+                    @let cells = decimals([(far.at_m[0], 0), (far.at_m[1], 0), (far.off_m, 1)]);
+                    tr { td { (far.feature) } td { (far.class) } (figures(cells)) td { (far.cause) } }
                 }
             }))
         }
@@ -313,18 +296,12 @@ pub(super) fn breaches(report: &Report, marks: &Marks) -> Markup {
     }
     html! {
         p { "All of them with their places: " code { "breaches.csv" } ", " code { "breaches.geojson" } "." }
-        (table(html! {
-            th { "Limit" } th { "Where" } th.n { "count" } th.n { "limit" } th.n { "excess" } th.n { "refused" }
-            th.n { "RMS, m" } th.n { "RMS without the limit, m" } }, html! {
+        @let columns = ["count", "limit", "excess", "refused", "RMS, m", "RMS without the limit, m"];
+        (table(heads(&["Limit", "Where"], &columns), html! {
             @for breach in report.breaches.iter().take(ROWS_MAX) {
-                tr {
-                    td { code { (breach.kind) } } td { (marks.link(breach.place)) }
-                    @for count in [breach.count, breach.limit, breach.excess] {
-                        td.n { (crate::report::amount(breach, count)) }
-                    }
-                    td.n { (breach.refused) } td.n { (format!("{:.3}", breach.rms_with_m)) }
-                    td.n { @if let Some(rms_m) = breach.rms_without_m { (format!("{rms_m:.3}")) } }
-                }
+                @let [count, limit, rest @ ..] = breach_cells(breach);
+                @let cells = [count, limit, amount(breach, breach.excess)].into_iter().chain(rest);
+                tr { td { code { (breach.kind) } } td { (marks.link(breach.place)) } (figures(cells)) }
             }
         }))
         (more(report.breaches.len(), ROWS_MAX, "breaches.csv"))
@@ -339,19 +316,18 @@ pub(super) fn stages(report: &Report) -> Markup {
         (table(html! { th { "Stage" } th.n { "wall, s" } th.n { "cpu, s" } th { "share of the time" } }, html! {
             @for stage in &report.stages {
                 tr {
-                    td { (stage.name) }
-                    td.n { (format!("{:.2}", stage.wall_s)) } td.n { (format!("{:.2}", stage.cpu_s)) }
+                    td { (stage.name) } (figures(decimals([(stage.wall_s, 2), (stage.cpu_s, 2)])))
                     td.share { span.bar style=(format!("width:{:.1}%", 100.0 * stage.wall_s / wall_s.max(1e-9))) {} }
                 }
             }
-            tr { td { b { "all" } } td.n { (format!("{wall_s:.2}")) } td.n { (format!("{cpu_s:.2}")) } td {} }
+            tr { td { b { "all" } } (figures(decimals([(wall_s, 2), (cpu_s, 2)]))) td {} }
         }))
     }
 }
 
 pub(super) fn sources(manifest: &Manifest) -> Markup {
     html! {
-        div.stack { (table(html! { th { "Source" } th { "BLAKE3 of its content" } th { "Attribution" } }, html! {
+        div.stack { (table(heads(&["Source", "BLAKE3 of its content", "Attribution"], &[]), html! {
             @for source in &manifest.sources {
                 tr {
                     td { code { (source.path) } } td { code { (source.blake3.to_string()) } }

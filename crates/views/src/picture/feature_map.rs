@@ -8,7 +8,7 @@ use super::objects::{draw_plans, object_keys};
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
 use super::sheet::{Drawing, Key, Legend, Sheet};
-use crate::features::outcome;
+use crate::map_files::outcome;
 use crate::table::grouped;
 
 /// What became of a feature, and its colour; the most important last, over the others.

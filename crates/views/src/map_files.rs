@@ -1,9 +1,9 @@
-//! Breaches for maps and for tables: as GeoJSON, a polygon for each load module or window with all its numbers, and as
-//! CSV, a line for each.
+//! What a report lists, for maps and for tables: as GeoJSON breaches and what was mended, degraded or left out of
+//! features, as CSV breaches.
 
 use geojson::{Feature, FeatureCollection, Geometry, JsonObject, JsonValue};
 use serde_json::json;
-use store::{Report, ReportBreach, ReportPlace};
+use store::{FeatureRemark, Report, ReportBreach, ReportPlace};
 
 /// Where load modules and windows lie on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,15 +20,49 @@ pub struct BreachPlaces {
     pub epsg: u32,
 }
 
-/// The breaches of `report` as a feature collection, indented, in metres of the area's coordinate system (named by a
-/// `crs` member, as GDAL and QGIS read it). Without breaches it is empty.
+/// The breaches of `report` as a feature collection: a polygon for each load module or window with all its numbers.
 pub fn breaches_geojson(report: &Report, places: &BreachPlaces) -> String {
-    let features = report.breaches.iter().map(|breach| feature(breach, places)).collect();
-    let crs = json!({ "type": "name", "properties": { "name": format!("urn:ogc:def:crs:EPSG::{}", places.epsg) } });
-    let members = [("name".to_owned(), json!("breaches")), ("crs".to_owned(), crs)];
-    let collection = FeatureCollection { bbox: None, features, foreign_members: Some(members.into_iter().collect()) };
-    let text = serde_json::to_string_pretty(&collection).expect("texts and finite numbers are JSON");
-    text + "\n"
+    let feature = |breach: &ReportBreach| {
+        let (place, row_col) = place_of(breach.place);
+        let mut properties = json!(breach);
+        properties["where"] = json!(place);
+        properties["row"] = json!(row_col.map(|at| at[0]));
+        properties["col"] = json!(row_col.map(|at| at[1]));
+        feature(Some(Geometry::new_polygon([places.ring(breach.place)])), &properties)
+    };
+    collection("breaches", report.breaches.iter().map(feature), places.epsg)
+}
+
+/// Remarks as a feature collection: a point for each. One without a place has no geometry.
+pub fn features_geojson(name: &str, remarks: &[FeatureRemark], epsg: u32) -> String {
+    let feature = |remark: &FeatureRemark| {
+        let FeatureRemark { feature: of, at_m, found, done, .. } = remark;
+        let properties = json!({ "feature": of, "outcome": outcome(remark), "found": found, "done": done });
+        feature(at_m.map(Geometry::new_point), &properties)
+    };
+    collection(name, remarks.iter().map(feature), epsg)
+}
+
+/// What became of a feature, in one word.
+pub fn outcome(remark: &FeatureRemark) -> &'static str {
+    match (remark.leaves_out, remark.degrades) {
+        (true, _) => "left out",
+        (false, true) => "degraded",
+        (false, false) => "mended",
+    }
+}
+
+fn feature(geometry: Option<Geometry>, properties: &JsonValue) -> Feature {
+    Feature { geometry, properties: properties.as_object().cloned(), ..Feature::default() }
+}
+
+/// Features, indented, in metres of the coordinate system with this EPSG code (named by a `crs` member, as GDAL and
+/// QGIS read it). There may be none.
+fn collection(name: &str, features: impl Iterator<Item = Feature>, epsg: u32) -> String {
+    let crs = json!({ "type": "name", "properties": { "name": format!("urn:ogc:def:crs:EPSG::{epsg}") } });
+    let members = JsonObject::from_iter([("name".to_owned(), json!(name)), ("crs".to_owned(), crs)]);
+    let collection = FeatureCollection { foreign_members: Some(members), ..FeatureCollection::new(features) };
+    serde_json::to_string_pretty(&collection).expect("texts and finite numbers are JSON") + "\n"
 }
 
 /// The breaches of `report` as CSV: a line of names, then one for each, with the numbers of [`breaches_geojson`] and
@@ -62,35 +96,6 @@ fn place_of(place: ReportPlace) -> (&'static str, Option<[u32; 2]>) {
         ReportPlace::Window(row_col) => ("window", Some(row_col)),
         ReportPlace::Area => ("area", None),
     }
-}
-
-fn feature(breach: &ReportBreach, places: &BreachPlaces) -> Feature {
-    let ring = places.ring(breach.place);
-    Feature {
-        bbox: None,
-        geometry: Some(Geometry::new_polygon([ring])),
-        id: None,
-        properties: Some(properties(breach)),
-        foreign_members: None,
-    }
-}
-
-fn properties(breach: &ReportBreach) -> JsonObject {
-    let (place, row_col) = place_of(breach.place);
-    let index = |which: usize| row_col.map_or(JsonValue::Null, |row_col| json!(row_col[which]));
-    let pairs = [
-        ("kind", json!(breach.kind)),
-        ("where", json!(place)),
-        ("row", index(0)),
-        ("col", index(1)),
-        ("count", json!(breach.count)),
-        ("limit", json!(breach.limit)),
-        ("excess", json!(breach.excess)),
-        ("refused", json!(breach.refused)),
-        ("rms_with_m", json!(breach.rms_with_m)),
-        ("rms_without_m", json!(breach.rms_without_m)),
-    ];
-    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 impl BreachPlaces {
@@ -162,10 +167,32 @@ mod tests {
     }
 
     #[test]
-    fn no_breach_is_an_empty_collection() {
+    fn each_remark_stands_at_its_place_with_what_was_found_and_done() {
+        let remark = |at_m, leaves_out, degrades| FeatureRemark {
+            feature: "way 12".into(),
+            at_m,
+            found: "it goes out and back".into(),
+            done: "left out".into(),
+            leaves_out,
+            degrades,
+        };
+        let remarks = [remark(Some([505_000.5, 3_875_000.0]), true, true), remark(None, false, true)];
+        let value: JsonValue = serde_json::from_str(&features_geojson("features", &remarks, 32611)).unwrap();
+        assert_eq!(value["crs"]["properties"]["name"], "urn:ogc:def:crs:EPSG::32611");
+        assert_eq!(value["features"][0]["geometry"]["coordinates"], json!([505_000.5, 3_875_000.0]));
+        let of = |index: usize, key: &str| value["features"][index]["properties"][key].clone();
+        assert_eq!((of(0, "feature"), of(0, "outcome")), (json!("way 12"), json!("left out")));
+        assert_eq!((of(1, "outcome"), of(1, "found")), (json!("degraded"), json!("it goes out and back")));
+        assert_eq!(value["features"][1]["geometry"], JsonValue::Null);
+    }
+
+    #[test]
+    fn no_breach_and_no_remark_is_an_empty_collection() {
         let mut report = samples::report();
         report.breaches.clear();
-        let value: JsonValue = serde_json::from_str(&breaches_geojson(&report, &PLACES)).unwrap();
-        assert_eq!(value["features"], json!([]));
+        for text in [breaches_geojson(&report, &PLACES), features_geojson("features", &[], 1)] {
+            let value: JsonValue = serde_json::from_str(&text).unwrap();
+            assert_eq!(value["features"], json!([]));
+        }
     }
 }
