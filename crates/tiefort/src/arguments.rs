@@ -2,13 +2,15 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, StyledStr, TypedValueParser};
 use clap::{Args, ValueEnum};
 use exports::Coordinates;
 use job::{Choice, Job, StartMethod};
+use serde_json::Value;
 use terrain::TileId;
 
 use crate::resources;
+use crate::terminal::{self, NotPrinted};
 
 /// Most workers that may be asked for: each is a thread with a tile's memory.
 const WORKERS_MAX: i64 = 1024;
@@ -20,6 +22,19 @@ pub enum Format {
     Text,
     /// For a program
     Json,
+}
+
+impl Format {
+    /// Prints what was found: as text, or as an object, indented.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Value) -> Result<(), NotPrinted> {
+        terminal::print(&match self {
+            Format::Text => text(),
+            Format::Json => format!("{:#}\n", json()),
+        })
+    }
 }
 
 /// How many tasks run at once.
@@ -113,22 +128,12 @@ pub fn rows_by_columns(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// What the coordinates of a mesh are counted from.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MeshOrigin {
-    /// The south-west corner of what is written
-    Local,
-    /// The map's origin
-    Map,
-}
-
-impl From<MeshOrigin> for Coordinates {
-    fn from(origin: MeshOrigin) -> Self {
-        match origin {
-            MeshOrigin::Local => Coordinates::Local,
-            MeshOrigin::Map => Coordinates::Map,
-        }
-    }
+/// Reads what the coordinates of a mesh are counted from.
+pub fn coordinates() -> impl TypedValueParser<Value = Coordinates> {
+    one_of([
+        ("local", Coordinates::Local, "The south-west corner of what is written"),
+        ("map", Coordinates::Map, "The map's origin"),
+    ])
 }
 
 /// Reads a finite number above zero.
@@ -163,11 +168,23 @@ pub fn start_methods() -> String {
     StartMethod::WORDS.iter().map(|word| word.name).collect::<Vec<_>>().join(", ")
 }
 
-/// Reads one of the words of a job's setting; help lists them with their meanings.
+/// Reads one of the words of a job's setting.
 pub fn choice<T: Choice + Clone + Send + Sync>() -> impl TypedValueParser<Value = T> {
-    let words = T::WORDS.iter().map(|word| PossibleValue::new(word.name).help(word.text()));
-    PossibleValuesParser::new(words)
-        .map(|name| T::named(&name).expect("only words of the setting are possible").clone())
+    one_of(T::WORDS.iter().map(|word| (word.name, word.value.clone(), word.text())))
+}
+
+/// Reads one of these words, each with what it stands for; help lists them with their meanings.
+pub fn one_of<T: Clone + Send + Sync + 'static>(
+    words: impl IntoIterator<Item = (&'static str, T, impl Into<StyledStr>)>,
+) -> impl TypedValueParser<Value = T> {
+    let (possible, known): (Vec<PossibleValue>, Vec<(&str, T)>) = words
+        .into_iter()
+        .map(|(word, value, meaning)| (PossibleValue::new(word).help(meaning.into()), (word, value)))
+        .unzip();
+    PossibleValuesParser::new(possible).map(move |found| {
+        let known = known.iter().find(|(word, _)| *word == found);
+        known.expect("only these words are possible").1.clone()
+    })
 }
 
 #[cfg(test)]

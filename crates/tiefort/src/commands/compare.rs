@@ -111,10 +111,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let signals = Signals::watch()?;
     let found = compared(arguments, request(arguments)?, signals.stop());
     let (found, seconds) = found.map_err(|failure| failure.after(signals.exit_code()))?;
-    terminal::print(&match arguments.format {
-        Format::Text => text(&found, &seconds),
-        Format::Json => format!("{:#}\n", to_json(&found, &seconds)),
-    })?;
+    arguments.format.print(|| text(&found, &seconds), || to_json(&found, &seconds))?;
     Ok(Outcome::Sound)
 }
 

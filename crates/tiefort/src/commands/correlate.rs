@@ -14,7 +14,7 @@ use crate::arguments::{Format, Workers, positive};
 use crate::certificate::certificate;
 use crate::failure::{Failure, Outcome};
 use crate::steps::Steps;
-use crate::{correlation_json, files, places, terminal};
+use crate::{correlation_json, files, places};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -109,10 +109,7 @@ fn range(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let steps = Steps::start(arguments.quiet);
     let found = found(arguments, &AtomicBool::new(false), &steps)?;
-    terminal::print(&match arguments.format {
-        Format::Text => certificate_text(&certificate(&found)),
-        Format::Json => format!("{:#}\n", correlation_json::to_json(&found)),
-    })?;
+    arguments.format.print(|| certificate_text(&certificate(&found)), || correlation_json::to_json(&found))?;
     Ok(if found.is_accepted() { Outcome::Sound } else { Outcome::Differ })
 }
 

@@ -12,7 +12,6 @@ use views::{Align, Table, fold, grouped};
 
 use crate::arguments::{Format, Workers, row_col};
 use crate::failure::{Failure, Outcome};
-use crate::terminal;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -50,10 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let module = ModuleId { row: arguments.module.row, col: arguments.module.col };
     let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
     let found = explain(&arguments.database, module, ground, arguments.workers.count())?;
-    terminal::print(&match arguments.format {
-        Format::Text => text(&found),
-        Format::Json => format!("{:#}\n", to_json(&found)),
-    })?;
+    arguments.format.print(|| text(&found), || to_json(&found))?;
     Ok(Outcome::Sound)
 }
 

@@ -7,16 +7,17 @@ use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
 use clap::Args;
 use exports::{
-    Block, CARRIES, Datum, ExportError, Facts, Forecast, LEFT_OUT, Levels, Mesh, Product, Textures, WebMap, Work,
+    Block, CARRIES, Coordinates, Datum, Engine, ExportError, Facts, Forecast, HeightEncoding, LEFT_OUT, Levels, Mesh,
+    Product, TextureFile, Textures, WebMap, Work,
 };
 use job::Job;
 use store::Folder;
 use terrain::{MaterialName, ModuleId, PostRect};
 use views::grouped;
 
-use super::export_formats::{Format, HeightEncoding, HeightmapEngine, Layer, TextureFile};
+use super::export_formats::{ENCODINGS, ENGINES, Format, Layer, TEXTURES};
 use super::export_together::Several;
-use crate::arguments::{MeshOrigin, Workers, row_col};
+use crate::arguments::{Workers, coordinates, one_of, row_col};
 use crate::failure::{Failure, Outcome};
 use crate::new_folder::NewFolder;
 use crate::signals::Signals;
@@ -78,8 +79,8 @@ pub struct Arguments {
     #[arg(long, value_name = "K")]
     lod: Option<usize>,
     /// What coordinates are counted from; for ply and obj only
-    #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
-    coordinates: MeshOrigin,
+    #[arg(long, value_parser = coordinates(), default_value = "local")]
+    coordinates: Coordinates,
     /// What the raster holds; for geotiff only [default: surface]
     #[arg(long, value_enum)]
     layer: Option<Layer>,
@@ -91,14 +92,14 @@ pub struct Arguments {
     #[arg(long, value_name = "DATUM", value_parser = datum, allow_hyphen_values = true)]
     assume_datum: Option<Datum>,
     /// Whose heightmaps; for heightmap only
-    #[arg(long, value_enum, default_value_t = HeightmapEngine::Unreal)]
-    engine: HeightmapEngine,
+    #[arg(long, value_parser = one_of(ENGINES), default_value = "unreal")]
+    engine: Engine,
     /// Samples along a side of a heightmap, one of those that the engine takes [default: the least that holds the area
     /// in one, else 2017 or 2049]; pixels along a side of a tile of terrain-rgb, 256 or 512 [default: 512]
     #[arg(long, value_name = "N")]
     size: Option<usize>,
     /// How heights become colours; for terrain-rgb only [default: mapbox]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(ENCODINGS))]
     encoding: Option<HeightEncoding>,
     /// Whether roads, rails and streams that are lines in the ground are bands over it, where the format has meshes
     #[arg(long, value_name = "BOOL", default_value_t = true, action = clap::ArgAction::Set)]
@@ -114,7 +115,7 @@ pub struct Arguments {
     #[arg(long, value_name = "M", value_parser = texel_m, requires = "imagery")]
     texel_m: Option<f64>,
     /// What kind of file a texture is; rgb, SGI's, for openflight only
-    #[arg(long, value_enum, default_value_t = TextureFile::Jpeg, requires = "imagery")]
+    #[arg(long, value_parser = one_of(TEXTURES), default_value = "jpeg", requires = "imagery")]
     texture: TextureFile,
     /// Texels along a side of a texture at most
     #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u16).range(16..=16384))]
@@ -210,7 +211,7 @@ pub fn checked(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
 
 /// Refuses what cannot be, before any work.
 fn check(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.coordinates == MeshOrigin::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
+    if arguments.coordinates == Coordinates::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
         let message = "found --coordinates map with a format that has no room for map coordinates, expected ply or obj";
         return Err(Failure::new(message, "leave --coordinates out; NAME.json beside the file says where it lies"));
     }
@@ -238,7 +239,7 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::new(message, "leave --texture out, or add --format openflight"));
     }
     let (is_heightmap, is_map) = (arguments.format == Format::Heightmap, arguments.format == Format::TerrainRgb);
-    if !is_heightmap && arguments.engine != HeightmapEngine::Unreal {
+    if !is_heightmap && arguments.engine != Engine::Unreal {
         let message = "found --engine with another format than heightmap, expected none";
         return Err(Failure::new(message, "leave it out, or add --format heightmap"));
     }
@@ -307,7 +308,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
             Format::Usd => exports::write_usd(&product, &put, work)?,
             Format::Gazebo => exports::write_gazebo(&product, &put, work)?,
             Format::Heightmap => {
-                exports::write_heightmap(&product, arguments.engine.into(), arguments.size, &put, work)?;
+                exports::write_heightmap(&product, arguments.engine, arguments.size, &put, work)?;
             }
             _ => exports::write_modules(&product, &put, work)?,
         }
@@ -360,7 +361,7 @@ fn open_imagery(arguments: &Arguments, product: &mut Product) -> Result<(), Fail
     let rect = product.rect;
     let ends = [product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east)];
     let most = usize::from(arguments.texture_max);
-    let file = (arguments.texture.into(), most);
+    let file = (arguments.texture, most);
     let textures = Textures::open(&arguments.imagery, product.crs(), ends, arguments.texel_m, file)?;
     product.textures = Some(Arc::new(textures));
     Ok(())
@@ -427,7 +428,7 @@ fn write_globe_file(arguments: &Arguments, product: &Product, work: &Work) -> Re
 }
 
 fn write_web_map(arguments: &Arguments, product: &Product, work: &Work) -> Result<(), Failure> {
-    let encoding = arguments.encoding.unwrap_or(HeightEncoding::Mapbox).into();
+    let encoding = arguments.encoding.unwrap_or(HeightEncoding::Mapbox);
     let map = WebMap { encoding, pixels: arguments.size.unwrap_or(512) };
     if files::extension(&arguments.out) == "pmtiles" {
         return files::write_whole_or(&arguments.out, |out| Ok(exports::write_pmtiles(out, product, map, work)?));
@@ -464,7 +465,7 @@ fn write_features(arguments: &Arguments) -> Result<(), Failure> {
 
 fn write_mesh(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
     let mesh = Mesh::of(product);
-    let coordinates = arguments.coordinates.into();
+    let coordinates = arguments.coordinates;
     let facts = match arguments.format {
         Format::Glb => Facts::y_up(product),
         _ => Facts::z_up(product, coordinates),

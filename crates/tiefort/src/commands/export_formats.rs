@@ -1,7 +1,7 @@
 //! The formats of `tiefort export`, and what is chosen by a word in some of them.
 
 use clap::ValueEnum;
-use exports::{CARRIES, Carries};
+use exports::{CARRIES, Carries, Engine, HeightEncoding, TextureFile};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
@@ -52,59 +52,24 @@ pub(super) enum Layer {
     Residual,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum HeightmapEngine {
-    /// Sides of 505, 1009, 2017, 4033 or 8129, as PNG
-    Unreal,
-    /// Sides of 2^n + 1, as RAW
-    Unity,
-}
+/// Whose heightmaps.
+pub(super) const ENGINES: [(&str, Engine, &str); 2] = [
+    ("unreal", Engine::Unreal, "Sides of 505, 1009, 2017, 4033 or 8129, as PNG"),
+    ("unity", Engine::Unity, "Sides of 2^n + 1, as RAW"),
+];
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum HeightEncoding {
-    /// Tenths of a metre above -10,000 m
-    Mapbox,
-    /// 256ths of a metre above -32,768 m
-    Terrarium,
-}
+/// How heights become colours.
+pub(super) const ENCODINGS: [(&str, HeightEncoding, &str); 2] = [
+    ("mapbox", HeightEncoding::Mapbox, "Tenths of a metre above -10,000 m"),
+    ("terrarium", HeightEncoding::Terrarium, "256ths of a metre above -32,768 m"),
+];
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum TextureFile {
-    /// JPEG
-    Jpeg,
-    /// PNG, which loses nothing
-    Png,
-    /// SGI's RGB, not compressed, for image generators
-    Rgb,
-}
-
-impl From<TextureFile> for exports::TextureFile {
-    fn from(file: TextureFile) -> Self {
-        match file {
-            TextureFile::Jpeg => exports::TextureFile::Jpeg,
-            TextureFile::Png => exports::TextureFile::Png,
-            TextureFile::Rgb => exports::TextureFile::Rgb,
-        }
-    }
-}
-
-impl From<HeightEncoding> for exports::HeightEncoding {
-    fn from(encoding: HeightEncoding) -> Self {
-        match encoding {
-            HeightEncoding::Mapbox => exports::HeightEncoding::Mapbox,
-            HeightEncoding::Terrarium => exports::HeightEncoding::Terrarium,
-        }
-    }
-}
-
-impl From<HeightmapEngine> for exports::Engine {
-    fn from(engine: HeightmapEngine) -> Self {
-        match engine {
-            HeightmapEngine::Unreal => exports::Engine::Unreal,
-            HeightmapEngine::Unity => exports::Engine::Unity,
-        }
-    }
-}
+/// What kind of file a texture is.
+pub(super) const TEXTURES: [(&str, TextureFile, &str); 3] = [
+    ("jpeg", TextureFile::Jpeg, "JPEG"),
+    ("png", TextureFile::Png, "PNG, which loses nothing"),
+    ("rgb", TextureFile::Rgb, "SGI's RGB, not compressed, for image generators"),
+];
 
 impl Format {
     /// The extensions of which its one file must have one; none where it is a folder.

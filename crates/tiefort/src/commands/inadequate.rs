@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use inspect::{Component, Inadequate};
 use serde_json::{Value, json};
 use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, fold, grouped};
 
-use crate::arguments::positive;
+use crate::arguments::{Format, one_of, positive};
 use crate::failure::{Failure, Outcome};
 use crate::{files, terminal};
 
@@ -47,17 +47,15 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// For a person or a program
-    #[arg(long, value_enum, default_value_t = Format::Text)]
+    #[arg(long, value_parser = one_of(FORMATS), default_value = "text")]
     format: Format,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// For a person
-    Text,
-    /// For a program: the content of inadequate.geojson
-    Json,
-}
+/// Whom it answers.
+const FORMATS: [(&str, Format, &str); 2] = [
+    ("text", Format::Text, "For a person"),
+    ("json", Format::Json, "For a program: the content of inadequate.geojson"),
+];
 
 /// Finds, and writes the three files.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {

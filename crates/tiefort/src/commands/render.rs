@@ -8,7 +8,7 @@ use store::Folder;
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Eye, Image, Map, RESIDUAL_SCALE_M, Shown, Sight, Style, draw_map, draw_sight};
 
-use crate::arguments::{Workers, positive};
+use crate::arguments::{Workers, one_of, positive};
 use crate::failure::{Failure, Outcome};
 use crate::files;
 
@@ -44,8 +44,8 @@ pub struct Arguments {
     #[arg(long, value_name = "ROW,COL..ROW,COL", value_parser = modules)]
     modules: Option<ModuleRect>,
     /// Which surface; for relief, perspective and wireframe [default: both in perspective, else tin]
-    #[arg(long, value_enum)]
-    of: Option<Of>,
+    #[arg(long, value_parser = one_of(SURFACES))]
+    of: Option<Shown>,
     /// Pixels along the longer side of a map, or across a perspective [default: 1400, 1000 where two are drawn]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(SIZE))]
     size: Option<u32>,
@@ -97,15 +97,12 @@ enum View {
     Features,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Of {
-    /// The load modules
-    Tin,
-    /// The ground they were made from
-    Dem,
-    /// Both, side by side
-    Both,
-}
+/// Which surface.
+const SURFACES: [(&str, Shown, &str); 3] = [
+    ("tin", Shown::Tin, "The load modules"),
+    ("dem", Shown::Dem, "The ground they were made from"),
+    ("both", Shown::Both, "Both, side by side"),
+];
 
 /// Draws.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
@@ -173,13 +170,8 @@ fn is_perspective(arguments: &Arguments) -> bool {
 }
 
 fn shown(arguments: &Arguments) -> Shown {
-    match arguments.of {
-        Some(Of::Tin) => Shown::Tin,
-        Some(Of::Dem) => Shown::Dem,
-        Some(Of::Both) => Shown::Both,
-        None if is_perspective(arguments) => Shown::Both,
-        None => Shown::Tin,
-    }
+    let usual = if is_perspective(arguments) { Shown::Both } else { Shown::Tin };
+    arguments.of.unwrap_or(usual)
 }
 
 fn needs_ground(arguments: &Arguments) -> bool {

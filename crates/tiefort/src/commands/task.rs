@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 
 use build::{ORDER, Stage, Unit, UnitEnd, is_of_tiles};
-use clap::builder::PossibleValue;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use job::Job;
 use terrain::TileId;
 
-use crate::arguments::{RunArguments, row_col};
+use crate::arguments::{RunArguments, one_of, row_col};
 use crate::commands::tile::check_tile;
 use crate::failure::{Failure, Outcome};
 use crate::run::{Finished, Run};
@@ -37,36 +36,13 @@ pub struct Arguments {
     #[arg(value_name = "JOB.toml")]
     job: PathBuf,
     /// What to do
-    #[arg(value_name = "STAGE")]
-    stage: StageName,
+    #[arg(value_name = "STAGE", value_parser = one_of(ORDER.map(|stage| (stage.name(), stage, stage.meaning()))))]
+    stage: Stage,
     /// Row and column of each tile, counted from the south-west
     #[arg(value_name = "ROW,COL", value_parser = row_col)]
     tiles: Vec<TileId>,
     #[command(flatten)]
     run: RunArguments,
-}
-
-/// A stage that engines run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct StageName(Stage);
-
-impl ValueEnum for StageName {
-    fn value_variants<'a>() -> &'a [Self] {
-        const ALL: [StageName; ORDER.len()] = {
-            let mut all = [StageName(Stage::Publish); ORDER.len()];
-            let mut at = 0;
-            while at < ORDER.len() {
-                all[at] = StageName(ORDER[at]);
-                at += 1;
-            }
-            all
-        };
-        &ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.0.name()).help(self.0.meaning()))
-    }
 }
 
 /// Does it.
@@ -83,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 }
 
 fn units(job: &Job, arguments: &Arguments) -> Result<Vec<Unit>, Failure> {
-    let (stage, tiles) = (arguments.stage.0, &arguments.tiles);
+    let (stage, tiles) = (arguments.stage, &arguments.tiles);
     match (is_of_tiles(stage), tiles.is_empty()) {
         (true, false) => tiles.iter().map(|&tile| check_tile(job, tile).map(|()| Unit::of(stage, tile))).collect(),
         (true, true) => {

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use terrain::{Metres, StopReason};
 use views::{Align, Table, eta_in_words, grouped};
 
-use crate::arguments::{MeshOrigin, Workers, choice, positive, rows_by_columns, start_method, start_methods};
+use crate::arguments::{Workers, choice, coordinates, positive, rows_by_columns, start_method, start_methods};
 use crate::clock::SystemClock;
 use crate::estimate::Estimate;
 use crate::failure::{Failure, Outcome};
@@ -104,8 +104,8 @@ pub struct Arguments {
     #[arg(long, value_name = "EPSG:CODE")]
     crs: Option<String>,
     /// What coordinates are counted from
-    #[arg(long, value_enum, default_value_t = MeshOrigin::Local)]
-    coordinates: MeshOrigin,
+    #[arg(long, value_parser = coordinates(), default_value = "local")]
+    coordinates: Coordinates,
     /// Measure the mesh against the raster, beside a regular grid, as `tiefort fidelity` does
     #[arg(long, conflicts_with = "quiet")]
     measure: bool,
@@ -169,7 +169,7 @@ pub enum Kind {
 
 /// Makes the mesh.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let on_map = arguments.coordinates == MeshOrigin::Map;
+    let on_map = arguments.coordinates == Coordinates::Map;
     let kind = kind_of(&arguments.out, on_map)?;
     let request = request(arguments)?;
     let outs = outs(arguments);
