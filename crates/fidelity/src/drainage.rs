@@ -4,6 +4,7 @@
 //! A channel counts as found where the other surface has one within two posts. A pit is ground that a flood from
 //! outside covers; it is spurious where the DEM, under it, is nowhere flooded even half as deep.
 
+use serde::Serialize;
 use terrain::QUANTA_PER_METRE;
 
 use crate::PostHeights;
@@ -17,15 +18,19 @@ pub const PIT_M: f64 = 1.0;
 const ASIDE_SQUARED: i32 = 4;
 
 /// Channels and pits of both surfaces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Drainage {
     /// Channel posts of the DEM, and how many of them the TIN has.
+    #[serde(rename = "channel_posts_dem")]
     pub channels_dem: u64,
     /// Those of them with a channel of the TIN within two posts.
+    #[serde(skip)]
     pub channels_found: u64,
     /// Channel posts of the TIN.
+    #[serde(rename = "channel_posts_tin")]
     pub channels_tin: u64,
     /// Those of them with a channel of the DEM within two posts.
+    #[serde(skip)]
     pub channels_true: u64,
     /// Pits of the DEM deeper than 1 m.
     pub pits_dem: u64,

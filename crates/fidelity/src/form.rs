@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::Serialize;
 use terrain::PostRect;
 
 use crate::Triangles;
@@ -20,7 +21,7 @@ const BINS_PER_DEGREE: f64 = 100.0;
 const DEGREES_MAX: f64 = 60.0;
 
 /// What is known of a mesh without its ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MeshForm {
     /// How many there are.
     pub triangles: u64,
@@ -31,6 +32,7 @@ pub struct MeshForm {
     /// The median of the triangles' smallest angles, in degrees, at most 0.01 too large.
     pub angle_median_degrees: f64,
     /// Triangles with an angle below 5 degrees.
+    #[serde(skip)]
     pub slivers: u64,
     /// Edges inside the area with a triangle on one side only.
     pub cracks: u64,

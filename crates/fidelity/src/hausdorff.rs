@@ -6,6 +6,7 @@
 
 use std::cell::Cell;
 
+use serde::Serialize;
 use terrain::{Metres, QUANTA_PER_METRE};
 
 use crate::nearest::{BilinearCell, Point, squared_to_triangle};
@@ -25,7 +26,7 @@ pub struct Hausdorff {
 }
 
 /// Distances from the places of one surface to another.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distances {
     /// Places asked.
     pub places: u64,

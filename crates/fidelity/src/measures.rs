@@ -1,5 +1,6 @@
 //! All measures of one surface against one DEM, what is asked of the DEM alone only once.
 
+use serde::Serialize;
 use terrain::{Dem, Metres, Post, PostRect};
 
 use crate::edges::Edges;
@@ -37,7 +38,7 @@ pub struct Measures {
 }
 
 /// Residuals of all posts that are not void, in metres.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ResidualFigures {
     /// Posts measured.
     pub posts: u64,

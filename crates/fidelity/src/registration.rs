@@ -5,6 +5,7 @@
 //! forms agree nearly as well a few posts aside. Whole posts are tried on some of the posts first, then the best of
 //! them and its neighbours on more; a paraboloid through these nine tells the rest.
 
+use serde::Serialize;
 use terrain::{Metres, QUANTA_PER_METRE};
 
 use crate::PostHeights;
@@ -15,7 +16,7 @@ pub const SHIFT_POSTS_MAX: i32 = 8;
 const POSTS_LOOKED_AT: (usize, usize) = (60_000, 1_000_000);
 
 /// Where the TIN lies against the DEM.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Registration {
     /// How far east of the DEM it lies, in metres.
     pub east_m: f64,

@@ -3,6 +3,7 @@
 //! A line that terrain does not explain shows as a crease. So the angle between the two triangles on an edge along such
 //! a line is held against that on other edges of like length; long edges lie in gentle ground and bend less.
 
+use serde::Serialize;
 use terrain::{Metres, QUANTA_PER_METRE};
 
 use crate::Triangles;
@@ -16,7 +17,7 @@ const CLASSES: usize = 128;
 const CLASS_OF_ONE_POST: f64 = 32.0;
 
 /// How much the ground bends along the lines between load modules.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SeamVisibility {
     /// Edges along lines between load modules that have others of like length.
     pub edges: u64,

@@ -6,6 +6,7 @@
 //! next to a void, are left out. Angles are figures to read and decide nothing, so their last bits may differ
 //! between machines.
 
+use serde::Serialize;
 use terrain::Metres;
 
 use crate::PostHeights;
@@ -14,7 +15,7 @@ use crate::PostHeights;
 const BINS_PER_DEGREE: f64 = 1000.0;
 
 /// How slopes differ, in degrees, over the inner posts.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct SlopeDifference {
     /// Posts compared.
     pub posts: u64,

@@ -6,10 +6,11 @@ use build::CompileError;
 use build::ground::GroundError;
 use build::product::{Product, Wanted, WantedGround};
 use fidelity::each_residual;
+use serde::Serialize;
 use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
 
 /// What differs between two databases.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Load modules that each has.
     pub modules: usize,
@@ -24,9 +25,10 @@ pub struct Difference {
 }
 
 /// A load module before and after.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ModuleDifference {
     /// Which.
+    #[serde(serialize_with = "crate::row_col")]
     pub module: ModuleId,
     /// Triangles of each.
     pub triangles: [u32; 2],
@@ -35,6 +37,7 @@ pub struct ModuleDifference {
     /// RMS residual of each, in metres.
     pub rms_m: [f64; 2],
     /// Largest residual of each, in metres.
+    #[serde(rename = "max_m")]
     pub largest_m: [f64; 2],
     /// Middle lines of ways of each.
     pub lines: [usize; 2],
@@ -44,7 +47,7 @@ pub struct ModuleDifference {
 }
 
 /// A setting that differs; empty where one has it not.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SettingDifference {
     /// The key with its section.
     pub key: String,

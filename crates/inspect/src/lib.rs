@@ -28,3 +28,8 @@ pub use correlate::{
 };
 
 mod recount;
+
+/// Writes a load module as its row and its column.
+fn row_col<S: serde::Serializer>(module: &terrain::ModuleId, out: S) -> Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(&[module.row, module.col], out)
+}

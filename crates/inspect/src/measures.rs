@@ -8,6 +8,7 @@ use build::ground::{GamingArea, Ground, GroundError, Window};
 use build::product::{Opened, choose_ground, locate_weights};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
 use schedule::Workers;
+use serde::Serialize;
 use store::{Folder, Totals};
 use terrain::{Dem, Importance, LoadModule, Metres, QUANTA_PER_METRE, Tin};
 
@@ -77,7 +78,7 @@ pub struct DatabaseFidelity {
 }
 
 /// How many of the pairs of the line-of-sight test are seen over the load modules, and past what stands on them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PastObjectsFound {
     /// Pairs of places.
     pub pairs: u64,
@@ -122,7 +123,7 @@ fn past_objects(folder: &Folder, area: &GamingArea, sights: Sights) -> Result<Pa
 }
 
 /// Residuals that `database.json` keeps, in metres.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BuiltResidual {
     /// Posts measured.
     pub posts: u64,

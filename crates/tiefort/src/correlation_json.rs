@@ -1,8 +1,9 @@
 //! What `tiefort correlate` found, for a program: shares from 0 to 1, `null` where nothing was there to measure.
 
-use inspect::{Confusion, Correlation, Criterion, HeightFigures, SLOPE_ENDS_DEGREES, Shift, SurfaceFacts};
+use inspect::{Confusion, Correlation, Criterion, HeightFigures, SLOPE_ENDS_DEGREES, Shift};
 use serde_json::{Value, json};
 
+use crate::measures_json::{measured, where_any};
 use crate::places;
 
 /// All of it.
@@ -13,8 +14,8 @@ pub fn to_json(found: &Correlation) -> Value {
         "accepted": found.is_accepted(),
         "causes": found.causes,
         "notes": found.notes,
-        "a": surface(&found.surfaces[0]),
-        "b": surface(&found.surfaces[1]),
+        "a": found.surfaces[0],
+        "b": found.surfaces[1],
         "common_m": found.common_m,
         "plan": {
             "accept": request.demand.share,
@@ -39,7 +40,7 @@ pub fn to_json(found: &Correlation) -> Value {
         "slopes": {
             "apart_m": found.slopes.apart_m,
             "ends_degrees": SLOPE_ENDS_DEGREES,
-            "rms_degrees": where_any(found.slopes.classes.total(), found.slopes.rms_degrees),
+            "rms_degrees": where_any(0 < found.slopes.classes.total(), found.slopes.rms_degrees),
             "classes": confusion(&found.slopes.classes),
         },
         "classes": found.classes.iter().map(|class| json!({
@@ -50,62 +51,29 @@ pub fn to_json(found: &Correlation) -> Value {
             "above_m": sight.above_m,
             "hidden_seen": confusion(&sight.pairs),
         })).collect::<Vec<_>>(),
-        "map": { "rows": found.map.rows, "cols": found.map.cols, "means_m": found.map.means_m },
-    })
-}
-
-fn where_any(count: u64, figure: f64) -> Value {
-    if count == 0 { Value::Null } else { json!(figure) }
-}
-
-fn surface(facts: &SurfaceFacts) -> Value {
-    json!({
-        "path": facts.path,
-        "kind": facts.kind,
-        "name": facts.name,
-        "crs": facts.crs,
-        "vertical_datum": facts.vertical_datum,
-        "extent_m": facts.extent_m,
-        "spacing_m": facts.spacing_m,
-        "modules": facts.modules,
-        "has_objects": facts.has_objects,
-        "blake3": facts.fingerprint,
+        "map": found.map,
     })
 }
 
 fn criterion(criterion: &Criterion) -> Value {
     let agreement = criterion.agreement();
-    json!({
-        "name": criterion.name,
-        "agrees_where": criterion.agrees_where,
-        "samples": criterion.samples,
-        "failures": criterion.failures,
-        "failures_max": criterion.failures_max,
+    let more = json!({
         "agreement": agreement.map(|(share, _)| share),
         "interval": agreement.map(|(_, interval)| interval),
         "accepted": criterion.is_accepted(),
-    })
+    });
+    measured(true, criterion, more)
 }
 
 fn heights(figures: &HeightFigures) -> Value {
-    let figure = |metres: f64| where_any(figures.places, metres);
-    let [p50, p90, p95, p99] = figures.absolute_m.map(figure);
-    json!({
-        "places": figures.places,
-        "within": figures.within,
-        "mean_m": figure(figures.mean_m),
-        "rms_m": figure(figures.rms_m),
-        "p50_m": p50,
-        "p90_m": p90,
-        "p95_m": p95,
-        "p99_m": p99,
-        "largest_m": figure(figures.largest_m),
-        "largest_at_m": (0 < figures.places).then_some(figures.largest_at_m),
-    })
+    let [p50, p90, p95, p99] = figures.absolute_m;
+    let largest_at_m = (0 < figures.places).then_some(figures.largest_at_m);
+    let more = json!({ "p50_m": p50, "p90_m": p90, "p95_m": p95, "p99_m": p99, "largest_at_m": largest_at_m });
+    measured(0 < figures.places, figures, more)
 }
 
 fn shift_json(shift: &Shift, found: &Correlation) -> Value {
-    let level = |metres: f64| if shift.is_level_told { json!(metres) } else { Value::Null };
+    let level = |metres: f64| where_any(shift.is_level_told, metres);
     let part = |of: [f64; 3]| json!({ "east_m": level(of[0]), "north_m": level(of[1]), "up_m": of[2] });
     json!({
         "moves_b_by": part(shift.by_m),
@@ -122,7 +90,7 @@ fn confusion<const N: usize>(table: &Confusion<N>) -> Value {
     json!({
         "a_by_b": table.0.iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
         "samples": table.total(),
-        "agreement": where_any(table.total(), table.agreeing() as f64 / table.total().max(1) as f64),
+        "agreement": where_any(0 < table.total(), table.agreeing() as f64 / table.total().max(1) as f64),
         "kappa": kappa.map(|kappa| kappa.kappa),
         "kappa_interval": kappa.map(|kappa| kappa.interval),
     })

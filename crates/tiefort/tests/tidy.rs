@@ -26,7 +26,7 @@ const OWNED_LIBRARIES: [(&str, &[&str]); 11] = [
     ("rayon", &["schedule"]),
     ("crossbeam", &["schedule"]),
     // Bodies of requests are read as what they should be, so that a large one takes no more room than its numbers.
-    ("serde", &["terrain", "store", "tiefort"]),
+    ("serde", &["terrain", "store", "fidelity", "inspect", "tiefort"]),
     ("bincode", &["store"]),
     ("serde_json", &["store", "build", "inspect", "views", "exports", "tiefort"]),
     ("clap", &["tiefort"]),

@@ -1,6 +1,7 @@
 //! What is asked of two surfaces, and what was found.
 
 use load_module_reader::Standing;
+use serde::Serialize;
 
 use super::heights::{DifferenceMap, HeightFigures, SlopeFigures};
 use super::shift::Shift;
@@ -102,7 +103,7 @@ pub(super) fn larger_spacing_m(surfaces: &[SurfaceFacts; 2]) -> f64 {
 }
 
 /// One thing that has to agree.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Criterion {
     /// Its name: `heights`, `slopes`, `sight 1 m`.
     pub name: String,

@@ -1,5 +1,7 @@
 //! How heights and slopes of two surfaces differ at places drawn over the area.
 
+use serde::Serialize;
+
 use super::statistics::Confusion;
 
 /// Where classes of slope end, in degrees.
@@ -26,7 +28,7 @@ impl Place {
 }
 
 /// How heights differ: those of B less those of A.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct HeightFigures {
     /// Places where both have a height.
     pub places: u64,
@@ -37,6 +39,7 @@ pub struct HeightFigures {
     /// Root mean square of differences, in metres.
     pub rms_m: f64,
     /// The absolute difference that half of the places do not exceed, then 90, 95 and 99 %, in metres.
+    #[serde(skip)]
     pub absolute_m: [f64; 4],
     /// The difference that is farthest from 0, in metres.
     pub largest_m: f64,
@@ -100,7 +103,7 @@ impl SlopeFigures {
 }
 
 /// Means of differences over squares of the area, for a picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DifferenceMap {
     /// Rows of squares, from the south.
     pub rows: usize,

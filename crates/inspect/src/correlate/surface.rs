@@ -11,13 +11,14 @@ use load_module_reader::{
     Area, Block, Curvature, Keep, LoadedGround, PastObjects, ReadError, Sight, Standing, open_file,
 };
 use schedule::{ScheduleError, Workers};
+use serde::Serialize;
 use store::{DatabaseError, Fingerprint};
 use terrain::TileId;
 
 use super::posts;
 
 /// What a surface is, as a certificate names it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SurfaceFacts {
     /// The path that was given.
     pub path: String,
@@ -36,10 +37,12 @@ pub struct SurfaceFacts {
     /// Load modules of a database.
     pub modules: Option<u64>,
     /// Names of the classes of a database's ground, by number.
+    #[serde(skip)]
     pub classes: Vec<String>,
     /// Whether a database has buildings or woods.
     pub has_objects: bool,
     /// Fingerprint (BLAKE3) of `database.json`, which holds those of all load modules, or of the raster.
+    #[serde(rename = "blake3")]
     pub fingerprint: String,
 }
 

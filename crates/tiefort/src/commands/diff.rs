@@ -10,7 +10,6 @@ use views::{Align, Table, grouped};
 use crate::arguments::{Format, Workers};
 use crate::failure::{Failure, Outcome};
 use crate::figures::Figures;
-use crate::terminal;
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -48,10 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let found = difference(&arguments.first, &arguments.second, arguments.workers.count())?;
     let figures = Figures::of(&arguments.first, &arguments.second);
     let rows = if arguments.all { usize::MAX } else { ROWS_MAX };
-    terminal::print(&match arguments.format {
-        Format::Text => text(&found, &figures, rows),
-        Format::Json => format!("{:#}\n", to_json(&found, &figures)),
-    })?;
+    arguments.format.print(|| text(&found, &figures, rows), || to_json(&found, &figures))?;
     Ok(if found.changed.is_empty() { Outcome::Sound } else { Outcome::Differ })
 }
 
@@ -99,24 +95,7 @@ fn list(found: &Difference, rows: usize) -> String {
 }
 
 fn to_json(found: &Difference, figures: &Figures) -> Value {
-    let module = |module: &ModuleDifference| {
-        json!({
-            "module": [module.module.row, module.module.col],
-            "apart_m": module.apart_m,
-            "triangles": module.triangles,
-            "polygons": module.polygons,
-            "lines": module.lines,
-            "rms_m": module.rms_m,
-            "max_m": module.largest_m,
-        })
-    };
-    let settings = found.settings.iter().map(|setting| json!({ "key": setting.key, "values": setting.values }));
-    json!({
-        "modules": found.modules,
-        "triangles": found.triangles,
-        "rms_m": found.rms_m,
-        "figures": figures.to_json(),
-        "settings": settings.collect::<Vec<_>>(),
-        "changed": found.changed.iter().map(module).collect::<Vec<_>>(),
-    })
+    let mut told = json!(found);
+    told["figures"] = figures.to_json();
+    told
 }

@@ -9,7 +9,7 @@ use views::grouped;
 
 use crate::arguments::Format;
 use crate::failure::{Failure, Outcome};
-use crate::{measures, measures_json, terminal};
+use crate::{measures, measures_json};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -57,10 +57,7 @@ const PAIRS_MAX: i64 = 100_000_000;
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let sights = Sights { pairs: arguments.pairs, seed: arguments.seed };
     let found = inspect::fidelity(&arguments.database, arguments.against.as_deref(), sights)?;
-    terminal::print(&match arguments.format {
-        Format::Text => text(&found),
-        Format::Json => format!("{:#}\n", to_json(&found, sights)),
-    })?;
+    arguments.format.print(|| text(&found), || to_json(&found, sights))?;
     Ok(Outcome::Sound)
 }
 
@@ -92,25 +89,14 @@ fn past_text(past: &PastObjectsFound) -> String {
 }
 
 fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
-    let residual = &found.residual;
     let mut all = json!({
         "area": found.area,
         "against": found.against,
         "has_features_burned_in": found.is_burned,
         "residual_at_own_posts": found.at_own_posts.as_ref().map(measures_json::residual),
         "seed": sights.seed,
-        "past_objects": found.past_objects.map(|past| json!({
-            "pairs": past.pairs,
-            "over_ground": past.over_ground,
-            "past_buildings": past.past_buildings,
-            "past_all": past.past_all,
-        })),
-        "residual_as_built": {
-            "posts": residual.posts,
-            "rms_m": residual.rms_m,
-            "mean_abs_m": residual.mean_abs_m,
-            "max_m": residual.max_m,
-        },
+        "past_objects": found.past_objects,
+        "residual_as_built": found.residual,
     });
     for (name, figures) in measures_json::fields(&found.measures) {
         all[name] = figures;
