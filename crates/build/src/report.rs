@@ -331,13 +331,8 @@ impl Findings<'_> {
     ) -> ReportBreach {
         let (grid, now) = (self.run.area.grid, self.by_module());
         let before = self.enforced.before.as_ref();
-        let rms = |of: &dyn Fn(ModuleId) -> ModuleNumbers| {
-            let parts = inside.iter().map(|&module| of(module).residual);
-            let (squares, posts) = parts.fold((0u64, 0u64), |(squares, posts), part| {
-                (squares + part.sum_squared, posts + u64::from(part.posts))
-            });
-            if posts == 0 { 0.0 } else { (squares as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE) }
-        };
+        let rms =
+            |of: &dyn Fn(ModuleId) -> ModuleNumbers| part_of(inside.iter().map(|&module| of(module).residual)).rms_m;
         ReportBreach {
             kind: kind.into(),
             place,
