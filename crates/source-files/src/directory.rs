@@ -8,6 +8,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use crate::SourceError;
+use crate::error::at_most;
 use crate::limits::{
     CHUNK_BYTES_A_BYTE, CHUNK_BYTES_FREE, CHUNK_BYTES_MAX, CHUNKS_MAX, POSTS_A_SIDE_MAX, POSTS_MAX, TAGS_MAX,
 };
@@ -307,7 +308,7 @@ impl Facts<'_> {
         let sample = self.sample()?;
         let cols = self.side(tag::IMAGE_WIDTH, "the width")?;
         let rows = self.side(tag::IMAGE_LENGTH, "the height")?;
-        self.at_most(u64::from(cols) * u64::from(rows), POSTS_MAX, "posts")?;
+        at_most(self.path, u64::from(cols) * u64::from(rows), POSTS_MAX, "posts")?;
         let tiled = (self.first)(tag::TILE_WIDTH).is_some();
         let (chunk_cols, chunk_rows) = match tiled {
             true => (self.side(tag::TILE_WIDTH, "the tile width")?, self.side(tag::TILE_LENGTH, "the tile height")?),
@@ -316,14 +317,10 @@ impl Facts<'_> {
         let layout = Layout { cols, rows, chunk_cols, chunk_rows, tiled, sample, packing };
         let posts = u64::from(chunk_cols) * u64::from(chunk_rows);
         let most = CHUNK_BYTES_FREE.saturating_add(CHUNK_BYTES_A_BYTE.saturating_mul(self.file_bytes));
-        self.at_most(posts * sample.bytes(), most.min(CHUNK_BYTES_MAX), "bytes in a strip or tile")?;
+        at_most(self.path, posts * sample.bytes(), most.min(CHUNK_BYTES_MAX), "bytes in a strip or tile")?;
         let chunks = u64::from(layout.chunks_across()) * u64::from(rows.div_ceil(chunk_rows));
-        self.at_most(chunks, CHUNKS_MAX, "strips or tiles")?;
+        at_most(self.path, chunks, CHUNKS_MAX, "strips or tiles")?;
         Ok(layout)
-    }
-
-    fn at_most(&self, found: u64, limit: u64, what: &'static str) -> Result<(), SourceError> {
-        if found <= limit { Ok(()) } else { Err(SourceError::TooLarge { path: self.path.into(), what, found, limit }) }
     }
 
     fn side(&self, tag: u16, what: &str) -> Result<u32, SourceError> {
@@ -334,7 +331,7 @@ impl Facts<'_> {
             expected: "a positive number".into(),
         };
         let posts = (self.first)(tag).ok_or_else(|| malformed("missing"))?;
-        self.at_most(posts, POSTS_A_SIDE_MAX, "posts a side")?;
+        at_most(self.path, posts, POSTS_A_SIDE_MAX, "posts a side")?;
         if posts == 0 { Err(malformed("0")) } else { Ok(posts as u32) }
     }
 

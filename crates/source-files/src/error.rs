@@ -213,6 +213,11 @@ pub enum SourceError {
     Given { path: PathBuf, place: String, found: String, expected: String },
 }
 
+/// Checks a number that a file says against a limit.
+pub(crate) fn at_most(path: &Path, found: u64, limit: u64, what: &'static str) -> Result<(), SourceError> {
+    if found <= limit { Ok(()) } else { Err(SourceError::TooLarge { path: path.into(), what, found, limit }) }
+}
+
 impl SourceError {
     /// What could be done about it, in one sentence, where there is something to say.
     pub fn hint(&self) -> Option<String> {

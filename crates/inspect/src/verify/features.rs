@@ -123,8 +123,8 @@ fn network(
     let ends = ways.ends(area);
     let [lakes, lakes_off_level, lakes_without_shore] = waters.counts(area);
     let WaysFound { kept_m, pieces_missing, gaps } = ways.found;
-    let ends = ends.len() as u64;
-    let found = NetworkFound { kept_m, pieces_missing, gaps, ends, lakes, lakes_off_level, lakes_without_shore };
+    let count = ends.len() as u64;
+    let found = NetworkFound { kept_m, pieces_missing, gaps, ends: count, lakes, lakes_off_level, lakes_without_shore };
     let mut problems: Vec<String> = ways.problem(area).into_iter().collect();
     let quanta = |at: f64, origin: f64| ((at - origin) * f64::from(QUANTA_PER_METRE)).round() as i64;
     let frame = area.frame;

@@ -9,6 +9,7 @@ use tiff::tags::{ByteOrder, Tag};
 use super::level::{Colors, Level, Packed};
 use crate::SourceError;
 use crate::directory::{compression_name, first_directory, sample_name, tag};
+use crate::error::at_most;
 use crate::frame::GeoTags;
 use crate::geotiff::{decoder, directory_error, geo_tags, nodata};
 use crate::limits::{CHUNKS_MAX, DIRECTORIES_MAX, POSTS_A_SIDE_MAX};
@@ -86,10 +87,6 @@ fn check_sizes(path: &Path, directory: &[(u16, u64)]) -> Result<(), SourceError>
         at_most(path, first(tag).unwrap_or(0), limit, what)?;
     }
     Ok(())
-}
-
-fn at_most(path: &Path, found: u64, limit: u64, what: &'static str) -> Result<(), SourceError> {
-    if found <= limit { Ok(()) } else { Err(SourceError::TooLarge { path: path.into(), what, found, limit }) }
 }
 
 /// A band, and whether colours are multiplied with it.
