@@ -8,7 +8,7 @@ use std::path::Path;
 
 use rusqlite::{Connection, ToSql, params};
 use source_files::geopackage_parts::{Extent, Layer, Package, add_index, line_z, polygon, polygon_z};
-use store::{Report, ReportPlace};
+use store::{Manifest, Report, ReportPlace};
 use terrain::{
     Decks, HOLE_CLASS, LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleRect, ModuleVertex,
     QUANTA_PER_METRE, metres_of_quanta,
@@ -256,11 +256,10 @@ impl Layers<'_> {
 
     fn add_tiles(&self, product: &Product) -> rusqlite::Result<()> {
         let mut add = self.0.begin(&TILES, extent(product, product.grid.all()))?;
-        for tile in &product.tiles {
-            let state = product.manifest.tile(tile.tile).map(|record| serde_json::json!(record.state));
-            let state = state.and_then(|state| state.as_str().map(str::to_owned));
-            let geometry = self.rectangle(extent(product, tile.modules));
-            add.execute(params![geometry, tile.tile.row, tile.tile.col, state])?;
+        let Manifest { tiles, area, .. } = &product.manifest;
+        for (record, modules) in tiles.iter().filter_map(|record| Some((record, area.modules_of(record.tile())?))) {
+            let state = serde_json::json!(record.state).as_str().map(str::to_owned);
+            add.execute(params![self.rectangle(extent(product, modules)), record.row, record.col, state])?;
         }
         Ok(())
     }

@@ -62,7 +62,7 @@ pub struct Product {
     pub(crate) materials: Vec<MaterialName>,
     /// Orthophotos that the ground is seen with.
     pub textures: Option<Arc<Textures>>,
-    /// The tile of each of them.
+    /// The tiles that they are of.
     pub(crate) tiles: Vec<TileModules>,
     /// Place in `tiles` of each module's tile.
     pub(crate) tile_of: Vec<u32>,
@@ -77,14 +77,13 @@ impl Product {
         let folder = Folder::new(folder);
         let manifest = folder.finished()?;
         let rect = rect_of(&manifest, block)?;
-        let ids: Vec<TileId> = manifest.tiles.iter().map(store::TileRecord::tile).collect();
+        let of_rect = |tile: &TileId| manifest.area.modules_of(*tile).and_then(|own| own.intersection(rect)).is_some();
+        let ids: Vec<TileId> = manifest.tiles.iter().map(store::TileRecord::tile).filter(of_rect).collect();
         let read = work.each("tiles read", &ids, |&tile| {
-            let (tile, levels) = folder.read_levels(tile)?;
-            let finest = levels.first().map_or(&[][..], Vec::as_slice).iter().filter(|module| rect.contains(module.id));
+            let (tile, levels) = if block.is_some() { folder.read_part(tile, rect) } else { folder.read_levels(tile) }?;
+            let finest = levels.first().map_or(&[][..], Vec::as_slice).iter();
             let lines: Vec<_> = finest.map(|module| (module.id, module.lines.clone())).collect();
-            let mut levels = wanted.of(levels)?;
-            levels.iter_mut().for_each(|modules| modules.retain(|module| rect.contains(module.id)));
-            Ok(((tile, levels), lines))
+            Ok(((tile, wanted.of(levels)?), lines))
         })?;
         let report = folder.report()?;
         let (read, lines): (Vec<_>, Vec<_>) = read.into_iter().unzip();

@@ -1,13 +1,15 @@
 //! Two databases of one area, compared load module by load module.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 use build::CompileError;
-use build::ground::GroundError;
-use build::product::{Product, Wanted, WantedGround};
+use build::ground::{GamingArea, GroundError};
+use build::product::{Opened, Product, ProductError};
 use fidelity::each_residual;
+use schedule::Workers;
 use serde::Serialize;
-use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE};
+use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, TileId};
 
 /// What differs between two databases.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -60,25 +62,34 @@ pub struct SettingDifference {
 /// # Errors
 /// When one is missing, unfinished or damaged, or they are not of the same ground.
 pub fn difference(first: &Path, second: &Path, workers: usize) -> Result<Difference, CompileError> {
-    let wanted = Wanted { part: None, ground: WantedGround::None, workers };
-    let (first_is, second_is) = (Product::read(first, &wanted)?, Product::read(second, &wanted)?);
+    let (first_is, second_is) = (Opened::open(first)?, Opened::open(second)?);
     check_same_ground(&first_is, &second_is, second)?;
-    let pairs = first_is.modules.iter().zip(&second_is.modules);
-    let changed = pairs.filter(|(a, b)| a != b).map(|(a, b)| module_difference(&first_is, a, b)).collect();
+    let area = &first_is.area;
+    // A tile of the first at a time: both are never held whole.
+    let of_tile = |_: usize, tile: &TileId| -> Result<Vec<ModuleDifference>, ProductError> {
+        let part = area.tiling.modules(*tile, area.grid);
+        let (of_first, of_second) = (Product::modules_in(&first_is, part)?, Product::modules_in(&second_is, part)?);
+        let pairs = of_first.iter().zip(&of_second).filter(|(a, b)| a != b);
+        Ok(pairs.map(|(a, b)| module_difference(area, a, b)).collect())
+    };
+    let changed = schedule::for_each_independent(&area.tiles, &Workers::new(workers), &AtomicBool::new(false), of_tile)
+        .map_err(|error| GroundError::from_schedule(&area.tiles, error))?;
+    let mut changed = changed.concat();
+    changed.sort_by_key(|of| of.module);
     Ok(Difference {
-        modules: first_is.modules.len(),
+        modules: area.grid.count(),
         changed,
         settings: settings(&first_is, &second_is),
-        triangles: [&first_is, &second_is].map(|product| product.manifest.totals.triangles),
-        rms_m: [&first_is, &second_is].map(|product| {
-            let totals = product.manifest.totals;
+        triangles: [&first_is, &second_is].map(|opened| opened.manifest.totals.triangles),
+        rms_m: [&first_is, &second_is].map(|opened| {
+            let totals = opened.manifest.totals;
             rms_m(totals.residual_sum_squared, totals.residual_posts)
         }),
     })
 }
 
 /// Whether load modules of both cover the same squares at the same posts; names and tiles may differ.
-fn check_same_ground(first: &Product, second: &Product, path: &Path) -> Result<(), CompileError> {
+fn check_same_ground(first: &Opened, second: &Opened, path: &Path) -> Result<(), CompileError> {
     let (mut area, other) = (first.manifest.area.clone(), &second.manifest.area);
     (area.name, area.vertical_datum) = (other.name.clone(), other.vertical_datum.clone());
     (area.tile_rows, area.tile_cols) = (other.tile_rows, other.tile_cols);
@@ -92,7 +103,7 @@ fn check_same_ground(first: &Product, second: &Product, path: &Path) -> Result<(
     .into())
 }
 
-fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> ModuleDifference {
+fn module_difference(area: &GamingArea, a: &LoadModule, b: &LoadModule) -> ModuleDifference {
     let rms = |module: &LoadModule| rms_m(module.residual.sum_squared, u64::from(module.residual.posts));
     let largest = |module: &LoadModule| f64::from(module.residual.largest) / f64::from(QUANTA_PER_METRE);
     ModuleDifference {
@@ -102,17 +113,17 @@ fn module_difference(product: &Product, a: &LoadModule, b: &LoadModule) -> Modul
         rms_m: [rms(a), rms(b)],
         largest_m: [largest(a), largest(b)],
         lines: [a, b].map(|module| module.lines.len()),
-        apart_m: f64::from(apart(product, a, b)) / f64::from(QUANTA_PER_METRE),
+        apart_m: f64::from(apart(area, a, b)) / f64::from(QUANTA_PER_METRE),
     }
 }
 
 /// How far two surfaces lie apart at most, in quanta: the difference of their residuals against any ground, such as
 /// flat one.
-fn apart(product: &Product, a: &LoadModule, b: &LoadModule) -> u32 {
-    let rect = product.grid.posts_of(a.id);
+fn apart(area: &GamingArea, a: &LoadModule, b: &LoadModule) -> u32 {
+    let rect = area.grid.posts_of(a.id);
     let flat = Dem::from_fn(rect, |_| Some(0));
     let mask = Importance::uniform(rect, terrain::THOUSANDTHS);
-    let ground = fidelity::Reference { dem: &flat, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
+    let ground = fidelity::Reference { dem: &flat, mask: &mask, grid: area.grid, spacing: area.frame.spacing };
     let wide = rect.posts_wide();
     let mut heights = vec![0; rect.post_count()];
     let place = |post: terrain::Post| (post.row - rect.south) as usize * wide + (post.col - rect.west) as usize;
@@ -127,7 +138,7 @@ fn rms_m(squares: u64, posts: u64) -> f64 {
 }
 
 /// Settings that differ, in the order of the first, then those that only the second has.
-fn settings(first: &Product, second: &Product) -> Vec<SettingDifference> {
+fn settings(first: &Opened, second: &Opened) -> Vec<SettingDifference> {
     let (before, after) = (first.job.describe(), second.job.describe());
     let value = |list: &[job::Setting], key: &str| {
         list.iter().find(|setting| setting.key == key).map_or(String::new(), |setting| setting.value.clone())

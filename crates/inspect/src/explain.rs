@@ -1,21 +1,19 @@
 //! One load module, explained: what it holds, what was refused there and why, what one more point would buy.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 use crate::explained_features::{ExplainedFeatures, ExplainedObjects, explained_features, explained_objects};
+use build::CompileError;
 use build::ground::GroundError;
-use build::product::{Product, Wanted, WantedGround};
-use build::{CompileError, Stage};
+use build::product::{Opened, Product, ProductError, Wanted, WantedGround};
 use fidelity::{Split, best_split};
 use job::HOLE_CLASS_NAME;
-use schedule::Workers;
 use serde_json::Value;
 use store::{Folder, TileState, files};
 use terrain::limits::Windows;
 use terrain::{
-    HOLE_CLASS, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId, TileTin,
-    metres_of_quanta,
+    HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, QUANTA_PER_METRE, RefusedBy, Side, StopReason, TileId,
+    TileTin, metres_of_quanta,
 };
 
 /// Everything there is to know about one load module.
@@ -53,8 +51,11 @@ pub struct Explanation {
     pub posts: u32,
     /// Of every level, the finest first: triangles, RMS and largest residual in metres; none where there is only one.
     pub levels: Vec<(u32, f64, f64)>,
-    /// Its place among all load modules by RMS residual, the worst being 1, and how many there are.
+    /// Its place by RMS residual among the load modules that it is compared with, the worst being 1, and how many these
+    /// are: all of the area, or some drawn evenly.
     pub place: (usize, usize),
+    /// How many load modules the area has, where only some were drawn to be compared with.
+    pub drawn_of: Option<usize>,
     /// Posts that were refused here, largest residual first.
     pub refused: Vec<ExplainedRefusal>,
     /// What one more point would buy; `None` without ground to look at, or where it would buy nothing.
@@ -100,8 +101,19 @@ pub struct OneMore {
     pub raised_m: f64,
     /// RMS residual of the load module then, in metres.
     pub rms_after_m: f64,
-    /// Place of this gain among those of all load modules, the largest being 1.
+    /// Place of this gain among those of the load modules that it is compared with, the largest being 1.
     pub place: usize,
+}
+
+/// The most load modules that are all compared with; what is there to see and the time it takes do not grow beyond.
+const ALL_MAX: usize = 16_384;
+/// Load modules that are drawn of more: a share of them is that of all within 3 %, 19 times in 20.
+const DRAWN: u32 = 1024;
+
+/// A load module that one is compared with.
+struct Compared {
+    mean_squares: f64,
+    split: Option<Split>,
 }
 
 /// Explains one load module of a finished database.
@@ -115,29 +127,27 @@ pub fn explain(
     ground: WantedGround,
     workers: usize,
 ) -> Result<Explanation, CompileError> {
-    let wanted = Wanted { part: None, ground, workers };
-    let (product, no_ground) = match Product::read(folder, &wanted) {
+    let opened = Opened::open(folder)?;
+    check_inside(module, opened.area.grid)?;
+    let (compared, no_ground) = match compared(&opened, module, ground, workers) {
         Err(error) if error.is_of_the_ground() && matches!(ground, WantedGround::Recorded) => {
-            let without = Product::read(folder, &Wanted { ground: WantedGround::None, ..wanted })?;
-            (without, Some(error.to_string()))
+            (self::compared(&opened, module, WantedGround::None, workers)?, Some(error.to_string()))
         }
         found => (found?, None),
     };
-    check_inside(module, &product)?;
-    let folder = Folder::new(folder);
-    let planned = product.tiles.iter().find(|tile| tile.modules.contains(module)).expect("tiles cover the area");
-    let (_, tin) = folder.read_tile(planned.tile)?;
-    let allocation = folder.read_json(files::ALLOCATION)?;
-    let splits = splits(&product, workers)?;
-    let levels = levels(&folder, planned.tile, module)?;
-    let found = explained(&product, module, &tin, &allocation, splits.as_deref());
-    let own = &product.modules[product.grid.index(module)];
-    let objects = explained_objects(&folder, &product, own, found.extent_m)?;
+    let part = around(&opened, module);
+    let product = Product::of(&opened, &Wanted { part: Some(part), ground: WantedGround::None, workers })?;
+    let tile = opened.area.tiling.tile_of_module(module, opened.area.grid);
+    let (_, tin) = opened.folder.read_tile(tile)?;
+    let allocation = opened.folder.read_json(files::ALLOCATION)?;
+    let levels = levels(&opened.folder, tile, module)?;
+    let found = explained(&product, module, &tin, &allocation, &compared);
+    let own = module_of(&product, module);
+    let objects = explained_objects(&opened.folder, &product, own, found.extent_m)?;
     Ok(Explanation { no_ground, levels, objects, ..found })
 }
 
-fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError> {
-    let (rows, cols) = (product.grid.rows, product.grid.cols);
+fn check_inside(module: ModuleId, ModuleGrid { rows, cols, .. }: ModuleGrid) -> Result<(), CompileError> {
     if module.row < rows && module.col < cols {
         return Ok(());
     }
@@ -150,37 +160,65 @@ fn check_inside(module: ModuleId, product: &Product) -> Result<(), CompileError>
     .into())
 }
 
-/// The best split of every load module, row by row, where there is ground to split on.
-fn splits(product: &Product, workers: usize) -> Result<Option<Vec<Option<Split>>>, CompileError> {
-    let Some(found) = &product.ground else { return Ok(None) };
-    let mask = Importance::uniform(found.dem.rect(), terrain::THOUSANDTHS);
-    let ground =
-        fidelity::Reference { dem: &found.dem, mask: &mask, grid: product.grid, spacing: product.frame.spacing };
-    let rows: Vec<&[LoadModule]> = product.modules.chunks(product.grid.cols as usize).collect();
-    let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
-    let of_row = |_: usize, row: &&[LoadModule]| -> Result<Vec<Option<Split>>, CompileError> {
-        Ok(row.iter().map(|module| best_split(module, &ground)).collect())
+/// The load modules that one is compared with, with their best splits where there is ground to split on, and that one
+/// at the end.
+fn compared(
+    opened: &Opened,
+    module: ModuleId,
+    ground: WantedGround,
+    workers: usize,
+) -> Result<Vec<Compared>, ProductError> {
+    let area = &opened.area;
+    let alone = |ModuleId { row, col }| ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
+    let own = alone(module);
+    let parts: Vec<ModuleRect> = match drawn(area.grid) {
+        None => area.tiles.iter().map(|tile| area.tiling.modules(*tile, area.grid)).chain([own]).collect(),
+        Some(drawn) => drawn.into_iter().map(alone).chain([own]).collect(),
     };
-    let done = schedule::for_each_independent(&rows, &workers, &stop, of_row).map_err(|error| {
-        CompileError::from_schedule(Stage::Read, &vec![TileId { row: 0, col: 0 }; rows.len()], error)
+    let found = Product::each_part(opened, ground, &parts, workers, |modules, window| {
+        let ground = window.map(|window| window.measured(area));
+        let of = |module: &LoadModule| Compared {
+            mean_squares: mean_squares(module.residual.sum_squared as f64, module),
+            split: ground.as_ref().and_then(|ground| best_split(module, ground)),
+        };
+        modules.iter().map(of).collect::<Vec<_>>()
     })?;
-    Ok(Some(done.into_iter().flatten().collect()))
+    Ok(found.into_iter().flatten().collect())
 }
 
-fn explained(
-    product: &Product,
-    id: ModuleId,
-    tin: &TileTin,
-    allocation: &Value,
-    splits: Option<&[Option<Split>]>,
-) -> Explanation {
-    let module = &product.modules[product.grid.index(id)];
+/// Those in the middle of equal parts of an area of many load modules; `None` where all are compared with.
+fn drawn(grid: ModuleGrid) -> Option<Vec<ModuleId>> {
+    if grid.count() <= ALL_MAX {
+        return None;
+    }
+    let step = (grid.count() as f64 / f64::from(DRAWN)).sqrt();
+    let middles = |all: u32| {
+        let parts = ((f64::from(all) / step).round() as u64).clamp(1, u64::from(all));
+        (0..parts).map(move |part| ((2 * part + 1) * u64::from(all) / (2 * parts)) as u32)
+    };
+    let places = middles(grid.rows).flat_map(|row| middles(grid.cols).map(move |col| ModuleId { row, col }));
+    Some(places.collect())
+}
+
+/// The load modules of all windows that hold one.
+fn around(opened: &Opened, ModuleId { row, col }: ModuleId) -> ModuleRect {
+    let windows = &opened.area.budget.windows;
+    let touching = windows.touching(ModuleRect { south: row, west: col, north: row + 1, east: col + 1 });
+    ModuleRect { north: touching.north - 1 + windows.rows, east: touching.east - 1 + windows.cols, ..touching }
+}
+
+/// One of the load modules that were read.
+fn module_of(product: &Product, id: ModuleId) -> &LoadModule {
+    let ModuleRect { south, west, .. } = product.part;
+    &product.modules[((id.row - south) * product.part.cols() + id.col - west) as usize]
+}
+
+fn explained(product: &Product, id: ModuleId, tin: &TileTin, allocation: &Value, compared: &[Compared]) -> Explanation {
+    let module = module_of(product, id);
     let state = product.manifest.tile(tin.tile).map_or(TileState::Missing, |record| record.state);
-    let limit_use = product.limit_use();
-    let limits = &product.job.limits;
     let on_sides = Side::ALL.map(|side| module.side_vertices(side).len() as u32);
-    let squares = |module: &LoadModule| mean_squares(module.residual.sum_squared as f64, module);
-    let worse = product.modules.iter().filter(|other| squares(module) < squares(other)).count();
+    let (own, others) = compared.split_last().expect("a load module is there itself");
+    let worse = others.iter().filter(|other| own.mean_squares < other.mean_squares).count();
     let residual = module.residual;
     let metre = f64::from(QUANTA_PER_METRE);
     let side_m = product.job.modules.side_m;
@@ -198,19 +236,20 @@ fn explained(
         polygons: module.counts().polygons,
         vertices_inside: (module.vertices.len() - module.border_vertex_count()) as u32,
         vertices_on_sides: on_sides,
-        count: (limit_use.modules[product.grid.index(id)], limits.per_load_module),
+        count: (product.job.counted(module), product.job.limits.per_load_module),
         granted: granted(allocation, id),
-        window: fullest_window(product, &limit_use.windows, id),
+        window: fullest_window(product, id),
         classes: classes(product, module),
         residual_m: [
-            squares(module).sqrt() / metre,
+            own.mean_squares.sqrt() / metre,
             residual.sum_abs as f64 / f64::from(residual.posts.max(1)) / metre,
             f64::from(residual.largest) / metre,
         ],
         posts: residual.posts,
-        place: (worse + 1, product.modules.len()),
+        place: (worse + 1, others.len()),
+        drawn_of: (others.len() < product.grid.count()).then(|| product.grid.count()),
         refused: refused(product, tin, id),
-        one_more: splits.and_then(|splits| one_more(product, splits, module)),
+        one_more: one_more(product, (own, others), module),
         no_ground: None,
         levels: Vec::new(),
         features: explained_features(product, id, [west, south, west + side_m, south + side_m]),
@@ -249,12 +288,14 @@ fn granted(allocation: &Value, module: ModuleId) -> u64 {
     entry.and_then(|entry| entry["triangles"].as_u64()).unwrap_or(0)
 }
 
-fn fullest_window(product: &Product, sums: &[u32], module: ModuleId) -> ExplainedWindow {
+fn fullest_window(product: &Product, module: ModuleId) -> ExplainedWindow {
     let limit = product.job.limits.window;
     let windows = Windows::of_size(product.grid, limit.rows, limit.cols);
-    let counts = windows.origins.iter().zip(sums);
-    let around = counts.filter(|(origin, _)| windows.modules_of(*origin).contains(module));
-    let (origin, &count) =
+    let ModuleId { row, col } = module;
+    let origins = windows.touching(ModuleRect { south: row, west: col, north: row + 1, east: col + 1 });
+    let count = |origin| windows.modules_of(origin).iter().map(|id| product.job.counted(module_of(product, id))).sum();
+    let around = origins.iter().map(|origin| (origin, count(origin)));
+    let (origin, count) =
         around.reduce(|fullest, next| if fullest.1 < next.1 { next } else { fullest }).expect("windows cover the area");
     ExplainedWindow { origin, size: [windows.rows, windows.cols], count, limit: limit.limit }
 }
@@ -280,9 +321,10 @@ fn refused(product: &Product, tin: &TileTin, module: ModuleId) -> Vec<ExplainedR
     refused
 }
 
-fn one_more(product: &Product, splits: &[Option<Split>], module: &LoadModule) -> Option<OneMore> {
-    let split = splits[product.grid.index(module.id)]?;
-    let larger = splits.iter().flatten().filter(|other| split.squares_saved < other.squares_saved).count();
+fn one_more(product: &Product, (own, others): (&Compared, &[Compared]), module: &LoadModule) -> Option<OneMore> {
+    let split = own.split?;
+    let gains = others.iter().filter_map(|other| other.split);
+    let larger = gains.filter(|other| split.squares_saved < other.squares_saved).count();
     let left = (module.residual.sum_squared as f64 - split.squares_saved).max(0.0);
     let metre = f64::from(QUANTA_PER_METRE);
     Some(OneMore {

@@ -6,6 +6,7 @@
 //! edges on their common side are the same.
 
 use std::collections::BTreeMap;
+use std::ops::Deref;
 
 use terrain::{Dem, Importance, LoadModule, ModuleGrid, ModuleId, ModuleResidual, Post, Spacing};
 
@@ -198,52 +199,65 @@ pub(crate) fn class_of(
     counts.iter().position(|&count| count == most).map(|class| class as u8)
 }
 
-/// What is wrong with the load modules of a grid and where they meet, a sentence each.
-pub(crate) fn problems(grid: ModuleGrid, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
-    let mut problems = Vec::new();
-    let mut known: BTreeMap<ModuleId, Sides> = BTreeMap::new();
-    for (&id, module) in modules {
-        match sides(module) {
-            Ok(sides) => drop(known.insert(id, sides)),
-            Err(what) => problems.push(format!("load module {id}: {what}")),
-        }
+/// The edges on the sides of the load modules of a row, where these are sound.
+pub(crate) struct RowSides(Vec<Option<Sides>>);
+
+impl RowSides {
+    /// Those of a row, none beyond the area; `problems` takes a sentence for each load module that is unsound.
+    pub fn of<M: Deref<Target = LoadModule>>(
+        grid: ModuleGrid,
+        row: u32,
+        get: impl Fn(&ModuleId) -> Option<M>,
+        problems: &mut Vec<String>,
+    ) -> Self {
+        let mut sides_of = |col| match sides(&*get(&ModuleId { row, col })?) {
+            Ok(sides) => Some(sides),
+            Err(what) => {
+                problems.push(format!("load module {}: {what}", ModuleId { row, col }));
+                None
+            }
+        };
+        let cols = if row < grid.rows { grid.cols } else { 0 };
+        Self((0..cols).map(&mut sides_of).collect())
     }
-    for id in grid.all().iter() {
-        let Some(here) = known.get(&id) else { continue };
-        if let Some(east) = known.get(&ModuleId { col: id.col + 1, ..id })
-            && here.east != east.west
-        {
+
+    fn at(&self, col: usize) -> Option<&Sides> {
+        self.0.get(col)?.as_ref()
+    }
+}
+
+/// What is wrong where the load modules of a row meet each other and those above, a sentence each.
+pub(crate) fn cracks(row: u32, here: &RowSides, above: &RowSides) -> Vec<String> {
+    let mut problems = Vec::new();
+    for (col, own) in here.0.iter().enumerate().filter_map(|(col, own)| Some((col, own.as_ref()?))) {
+        let id = ModuleId { row, col: col as u32 };
+        if here.at(col + 1).is_some_and(|east| own.east != east.west) {
             problems.push(format!("load module {id}: its edges on the eastern side are not its neighbour's: a crack"));
         }
-        if let Some(north) = known.get(&ModuleId { row: id.row + 1, ..id })
-            && here.north != north.south
-        {
+        if above.at(col).is_some_and(|north| own.north != north.south) {
             problems.push(format!("load module {id}: its edges on the northern side are not its neighbour's: a crack"));
         }
     }
     problems
 }
 
-/// What is wrong where load modules of any two levels meet, a sentence each: every one is sound by itself.
-pub(crate) fn problems_between(grid: ModuleGrid, levels: &[BTreeMap<ModuleId, LoadModule>]) -> Vec<String> {
-    let known: Vec<BTreeMap<ModuleId, Sides>> = levels
-        .iter()
-        .map(|modules| modules.iter().filter_map(|(&id, module)| Some((id, sides(module).ok()?))).collect())
-        .collect();
+/// What is wrong where the load modules of a row at one level meet those of another, in this row and above, a sentence
+/// each: every one is sound by itself.
+pub(crate) fn cracks_between(
+    row: u32,
+    (here, sides): (usize, &RowSides),
+    (there, [beside, above]): (usize, [&RowSides; 2]),
+) -> Vec<String> {
     let mut problems = Vec::new();
-    let pairs = (0..known.len()).flat_map(|here| (0..known.len()).map(move |there| (here, there)));
-    for (here, there) in pairs.filter(|(here, there)| here != there) {
-        for id in grid.all().iter() {
-            let Some(own) = known[here].get(&id) else { continue };
-            let (east, north) = (ModuleId { col: id.col + 1, ..id }, ModuleId { row: id.row + 1, ..id });
-            let beside = known[there].get(&east).map(|other| ("eastern", own.east == other.west));
-            let above = known[there].get(&north).map(|other| ("northern", own.north == other.south));
-            for (name, _) in [beside, above].into_iter().flatten().filter(|(_, is_shared)| !is_shared) {
-                problems.push(format!(
-                    "load module {id}: its edges on the {name} side at level {here} are not its neighbour's at level \
-                     {there}: a crack"
-                ));
-            }
+    for (col, own) in sides.0.iter().enumerate().filter_map(|(col, own)| Some((col, own.as_ref()?))) {
+        let id = ModuleId { row, col: col as u32 };
+        let beside = beside.at(col + 1).map(|other| ("eastern", own.east == other.west));
+        let above = above.at(col).map(|other| ("northern", own.north == other.south));
+        for (name, _) in [beside, above].into_iter().flatten().filter(|(_, is_shared)| !is_shared) {
+            problems.push(format!(
+                "load module {id}: its edges on the {name} side at level {here} are not its neighbour's at level \
+                 {there}: a crack"
+            ));
         }
     }
     problems
@@ -254,6 +268,22 @@ mod tests {
     use terrain::{Decks, ModuleVertex};
 
     use super::*;
+
+    /// What is wrong with two load modules at a level, and where they meet.
+    fn problems(grid: ModuleGrid, modules: &BTreeMap<ModuleId, LoadModule>) -> Vec<String> {
+        let mut problems = Vec::new();
+        let [here, above] = [0, 1].map(|row| RowSides::of(grid, row, |id| modules.get(id), &mut problems));
+        problems.extend(cracks(0, &here, &above));
+        problems
+    }
+
+    /// What is wrong where two levels meet.
+    fn problems_between(grid: ModuleGrid, levels: &[BTreeMap<ModuleId, LoadModule>; 2]) -> Vec<String> {
+        let [one, other] = [0, 1]
+            .map(|level: usize| [0, 1].map(|row| RowSides::of(grid, row, |id| levels[level].get(id), &mut Vec::new())));
+        let found = cracks_between(0, (0, &one[0]), (1, [&other[0], &other[1]]));
+        [found, cracks_between(0, (1, &other[0]), (0, [&one[0], &one[1]]))].concat()
+    }
 
     /// A square of 100 quanta in four triangles around its middle, with another vertex on the eastern side if wanted.
     fn square(col: u32, extra: bool) -> LoadModule {

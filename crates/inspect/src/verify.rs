@@ -16,28 +16,30 @@ mod square;
 mod standing;
 mod tins;
 mod total;
+mod walk;
 mod waters;
 mod ways;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
 
 use build::ground::{Bounds, GamingArea, Ground, Window};
 use build::product::Opened;
 use build::{CompileError, residual_of};
 use fidelity::Residuals;
-use job::{DemSource, Edges, Job, LodBorder, SourceEntry, SourceFile, SourceSaid};
+use job::{DemSource, Job, SourceEntry, SourceFile, SourceSaid};
 use schedule::Workers;
 use store::{Folder, Manifest, ManifestState, Report, ReportResidual, files};
-use terrain::limits::{polygons_of, triangles_of};
-use terrain::{LoadModule, ModuleId, Side};
+use terrain::{LoadModule, ModuleId};
 
 use crate::recount;
 use beyond::{Around, Beyond};
 use classes::Classes;
 pub use features::NetworkFound;
 use modules::{Modules, at_level};
+use walk::Walked;
 
 /// What a verification found.
 #[derive(Clone, Debug, Default)]
@@ -92,15 +94,19 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
         return Ok(verdict);
     }
     let opened = opened::open(&folder, &job, &area)?;
-    let levels = &opened.levels;
-    verdict.checked_modules = levels[0].len();
-    verdict.problems.extend(check_levels(&job, &area, levels));
-    verdict.problems.extend(opened.problems);
+    let levels = &Modules::levels(&folder, &area, opened.level_count);
+    let mut walked = walk::walk(&job, &area, levels);
+    levels[0].fault()?;
+    verdict.checked_modules = walked.sums[0].modules;
+    verdict.problems.append(&mut walked.problems);
+    verdict
+        .problems
+        .extend(opened.problems.into_iter().zip(&walked.unknown).flat_map(|(of, more)| [of, more.clone()].concat()));
     // Only load modules that are sound in themselves are held against anything else.
     if verdict.problems.is_empty() {
         check_sums(
             &Whole { folder: &folder, manifest: &manifest, job: &job, area: &area },
-            levels,
+            (levels, walked),
             &mut verdict,
             |tins| made_from::problems(&folder, &manifest, &job, &area, tins, &opened.fingerprints),
         )?;
@@ -111,6 +117,7 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
         let residuals = recompute(job, &built, dem, levels, report.as_ref(), &mut verdict)?;
         verdict.residual = Some(residual_of(&residuals.total()));
     }
+    levels[0].fault()?;
     Ok(verdict)
 }
 
@@ -125,7 +132,7 @@ struct Whole<'a> {
 /// Everything that is counted over many load modules: TINs, limits, totals, the report.
 fn check_sums(
     whole: &Whole,
-    levels: &[Modules],
+    (levels, walked): (&[Modules], Walked),
     verdict: &mut Verdict,
     made_from: impl FnOnce(&tins::OfTins) -> (Vec<String>, Vec<String>),
 ) -> Result<(), CompileError> {
@@ -133,8 +140,7 @@ fn check_sums(
     let modules = &levels[0];
     let tins = tins::check(folder, manifest, job, area, modules)?;
     verdict.problems.extend(tins.problems.iter().cloned());
-    verdict.problems.extend(levels.iter().flat_map(|modules| figures::impossible(area, modules)));
-    verdict.problems.extend(check_polygons(job, levels));
+    verdict.problems.extend(walked.figures);
     if !verdict.problems.is_empty() {
         return Ok(());
     }
@@ -142,11 +148,11 @@ fn check_sums(
     verdict.problems.extend(problems);
     verdict.unchecked.extend(unchecked);
     let report = if folder.path(files::REPORT).exists() { Some(folder.report()?) } else { None };
-    let features = features::check(folder, manifest, job, area, modules, report.as_ref())?;
+    let features = features::check(folder, manifest, job, area, (modules, &walked.decks), report.as_ref())?;
     verdict.problems.extend(features.problems);
     verdict.unchecked.extend(features.unchecked);
     verdict.network = features.network;
-    verdict.decks = deck::told(levels, &job.class_names());
+    verdict.decks = deck::told(&walked.sums, &job.class_names());
     if let Some(spec) = &job.objects {
         let (_, _, outlines) = folder.read_outlines()?;
         let of_report = report.as_ref().and_then(|report| report.objects.as_ref());
@@ -154,20 +160,20 @@ fn check_sums(
         verdict.problems.extend(standing.problems);
         verdict.objects = Some(standing.told);
     }
-    let counts = exceeded::counts(job, area, modules);
+    let (counts, sums) = (walked.counts, &walked.sums);
     let mut exceeded = exceeded::of_counts(area, &counts);
     verdict.problems.extend(exceeded::wrong_states(manifest, area, &exceeded));
-    let total = total::Total::of(modules.values().map(|module| module.residual));
+    let total = sums[0].residual;
     exceeded.extend(exceeded::of_residuals(job, &total));
     let (problems, unchecked) = exceeded::check(folder, job, report.as_ref(), &exceeded);
     verdict.problems.extend(problems);
     verdict.unchecked.extend(unchecked);
-    verdict.problems.extend(figures::differing_totals(manifest, area, modules, (&counts, &exceeded), &tins));
+    verdict.problems.extend(figures::differing_totals(manifest, area, &sums[0], (&counts, &exceeded), &tins));
     let measured = figures::measured(folder, manifest, area, levels, &tins);
     verdict.problems.extend(measured.problems);
     if let Some(report) = &report {
         let of_files = (&counts[..], &tins, measured.sums.as_ref());
-        verdict.problems.extend(figures::differing_report(report, job, area, levels, of_files));
+        verdict.problems.extend(figures::differing_report(report, job, area, sums, of_files));
         verdict.unchecked.extend(unchecked_figures(report));
     }
     Ok(())
@@ -177,23 +183,6 @@ fn check_sums(
 fn unchecked_figures(report: &Report) -> Option<String> {
     let told = figures::is_of_other_ground(report);
     told.then(|| "residuals in report.json: it says that tiles were made from other ground".to_owned())
-}
-
-/// Polygons of load modules that nothing cut: every triangle is one.
-fn check_polygons(job: &Job, levels: &[Modules]) -> Vec<String> {
-    let mut problems = Vec::new();
-    let first = usize::from(job.modules.edges != Edges::Constrained);
-    for (level, modules) in levels.iter().enumerate().skip(first) {
-        let wrong = modules.values().filter(|module| module.polygon_count as usize != module.triangles.len());
-        problems.extend(wrong.map(|module| {
-            let (id, polygons, triangles) = (module.id, module.polygon_count, module.triangles.len());
-            at_level(
-                level,
-                format!("load module {id}: {polygons} polygons, and each of its {triangles} triangles is one"),
-            )
-        }));
-    }
-    problems
 }
 
 fn listed(manifest: &Manifest) -> usize {
@@ -208,96 +197,13 @@ fn listed(manifest: &Manifest) -> usize {
 }
 
 /// All load modules by place, at their finest level, checked one by one as they are decoded.
-pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<Modules, CompileError> {
+pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
     let mut all = BTreeMap::new();
     for &tile in &area.tiles {
         let (_, modules) = folder.read_modules(tile)?;
         all.extend(modules.into_iter().map(|module| (module.id, module)));
     }
     Ok(all)
-}
-
-/// Every level on its own, then how they fit together.
-fn check_levels(job: &Job, area: &GamingArea, levels: &[Modules]) -> Vec<String> {
-    let mut problems = Vec::new();
-    let (found, expected) = (levels.len(), job.lod.level_count());
-    if expected < found {
-        problems.push(format!("load modules: {found} levels in a file, the job has {expected}"));
-    }
-    for (level, modules) in levels.iter().enumerate() {
-        let own = [check_modules(area, modules), recount::problems(area.grid, modules)].concat();
-        problems.extend(own.into_iter().map(|problem| at_level(level, problem)));
-        if 0 < level {
-            problems.extend(check_coarser(level, modules, &levels[level - 1]));
-        }
-    }
-    if job.lod.border == LodBorder::Full && problems.is_empty() {
-        problems.extend(recount::problems_between(area.grid, levels));
-    }
-    problems
-}
-
-/// A coarser level holds no place that the finer one lacks.
-fn check_coarser(level: usize, modules: &Modules, finer: &Modules) -> Vec<String> {
-    let is_new = |module: &&LoadModule| {
-        let known: BTreeSet<(u16, u16)> =
-            finer.get(&module.id).into_iter().flat_map(|finer| &finer.vertices).map(|v| (v.y, v.x)).collect();
-        module.vertices.iter().any(|v| !known.contains(&(v.y, v.x)))
-    };
-    let new = modules.values().filter(is_new);
-    new.map(|module| format!("level {level}: load module {}: a vertex that the finer level has not", module.id))
-        .collect()
-}
-
-fn check_modules(area: &GamingArea, modules: &Modules) -> Vec<String> {
-    let mut problems = Vec::new();
-    for module in area.grid.all().iter() {
-        let Some(found) = modules.get(&module) else {
-            problems.push(format!("load module {module}: missing"));
-            continue;
-        };
-        if let Err(fault) = found.check() {
-            problems.push(format!("load module {module}: {fault}"));
-        }
-        problems.extend(check_identities(found));
-        let east = modules.get(&ModuleId { col: module.col + 1, ..module });
-        let north = modules.get(&ModuleId { row: module.row + 1, ..module });
-        for (other, side) in [(east, Side::East), (north, Side::North)] {
-            if other.is_some_and(|other| side_of(found, side) != side_of(other, side.opposite())) {
-                problems.push(format!(
-                    "load module {module}: its {} side differs from its neighbour's: a crack",
-                    if side == Side::East { "eastern" } else { "northern" }
-                ));
-            }
-        }
-    }
-    problems
-}
-
-/// Both identities of every load module, from edges counted anew.
-fn check_identities(module: &LoadModule) -> Option<String> {
-    let border = module.border_vertex_count();
-    let inner = module.vertices.len() - border;
-    let triangles = module.triangles.len();
-    let expected = triangles_of(inner, border);
-    if triangles != expected {
-        return Some(format!("load module {}: {triangles} triangles, expected {expected}", module.id));
-    }
-    // Every triangle has three edges; those inside the square are shared by two.
-    let inner_edges = (3 * triangles - border) / 2;
-    let polygons = polygons_of(inner, inner_edges);
-    let count = module.polygon_count as usize;
-    (polygons < count).then(|| format!("load module {}: {count} polygons, expected at most {polygons}", module.id))
-}
-
-/// What a load module holds on a side: place along it and height.
-fn side_of(module: &LoadModule, side: Side) -> Vec<(u16, i32)> {
-    let vertices = module.side_vertices(side).into_iter().map(|index| module.vertices[usize::from(index)]);
-    let along = |vertex: terrain::ModuleVertex| match side {
-        Side::South | Side::North => (vertex.x, vertex.z),
-        Side::East | Side::West => (vertex.y, vertex.z),
-    };
-    vertices.map(along).collect()
 }
 
 /// What was built, where, and by which algorithms.
@@ -345,14 +251,14 @@ fn recompute(
         let natural = ground.natural_tile(area, tile)?;
         let around = Around::of(&ground, (&job, area), (&window, &features))?;
         for (level, modules) in levels.iter().enumerate() {
-            let ids = area.tiling.modules(tile, area.grid);
-            let mut own: Vec<LoadModule> = ids.iter().filter_map(|module| modules.get(&module).cloned()).collect();
+            let listed = modules.of_tile(tile);
+            let mut own: Vec<LoadModule> = listed.iter().map(|module| LoadModule::clone(module)).collect();
             let residuals = fidelity::measure(&mut own, &window.measured(area));
             beyond.add(level, &own, &around);
             if level == 0 {
                 all.merge(&residuals);
             }
-            let mut of_level = differing_residuals(&own, modules, &window, area);
+            let mut of_level = differing_residuals(&own, &listed, &window, area);
             if has_classes {
                 let (grid, spacing) = (area.grid, area.frame.spacing);
                 let classes = Classes::new(&job, &features, level, spacing);
@@ -383,10 +289,11 @@ fn outside(modules: &Modules, bounds: Bounds, residuals: &Residuals) -> Option<S
     let (low, high) = bounds.metres();
     let permitted_m = (largest_m + 1.0).max((high - low) / 10.0);
     let is_outside = |vertex: &&terrain::ModuleVertex| permitted_m < outside_m(vertex);
-    let outside =
-        modules.values().flat_map(|module| module.vertices.iter().filter(is_outside).map(move |v| (module.id, v)));
+    let of_module =
+        |module: &LoadModule| module.vertices.iter().filter(is_outside).map(|v| (module.id, *v)).collect::<Vec<_>>();
+    let outside = modules.values().flat_map(|module| of_module(&module));
     let (count, worst) = outside.fold((0, None), |(count, worst): (usize, Option<(ModuleId, f64)>), (id, vertex)| {
-        let found = (id, outside_m(vertex));
+        let found = (id, outside_m(&vertex));
         (count + 1, Some(worst.filter(|worst| found.1 <= worst.1).unwrap_or(found)))
     });
     worst.map(|(id, metres)| {
@@ -398,16 +305,20 @@ fn outside(modules: &Modules, bounds: Bounds, residuals: &Residuals) -> Option<S
 }
 
 /// Load modules, measured just now, whose residuals are not those of a second opinion or of their files.
-fn differing_residuals(own: &[LoadModule], listed: &Modules, window: &Window, area: &GamingArea) -> Vec<String> {
+fn differing_residuals(
+    own: &[LoadModule],
+    listed: &[Rc<LoadModule>],
+    window: &Window,
+    area: &GamingArea,
+) -> Vec<String> {
     let recounted =
         |module: &LoadModule| recount::residual(module, &window.dem, area.grid, area.frame.spacing) == module.residual;
     let doubtful = own.iter().filter(|module| !recounted(module)).map(|module| {
         format!("load module {}: two ways to measure its residuals against this DEM disagree", module.id)
     });
-    let differs = |module: &&LoadModule| listed[&module.id].residual != module.residual;
-    let wrong = own
-        .iter()
-        .filter(differs)
-        .map(|module| format!("load module {}: its residuals against this DEM are not those in its file", module.id));
+    let differs = own.iter().zip(listed).filter(|(module, listed)| listed.residual != module.residual);
+    let wrong = differs.map(|(module, _)| {
+        format!("load module {}: its residuals against this DEM are not those in its file", module.id)
+    });
     doubtful.chain(wrong).collect()
 }

@@ -1,6 +1,7 @@
 //! A gaming area opened for a simulator: all its files, of which load modules are taken as they are needed.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -9,13 +10,12 @@ use crate::{AreaFrame, Block, Keep, ReadError, TerrainModule, TileFile};
 /// Extension of load-module files.
 const EXTENSION: &str = "slm";
 
-/// A gaming area: its files, headers and indexes read, load modules left where they are.
+/// A gaming area: the headers of its files read, load modules left where they are.
 #[derive(Debug)]
 pub struct Area {
     files: Vec<TileFile>,
-    /// Place in `files` of the file of each load module that is in one, by row and column. As large as what the files
-    /// hold, however large an area their headers promise.
-    file_of: HashMap<[u32; 2], u32>,
+    /// Of each row of load modules, the columns that files hold, and the places of these in `files`.
+    rows: BTreeMap<u32, Vec<(Range<u32>, u32)>>,
     frame: AreaFrame,
 }
 
@@ -56,17 +56,24 @@ impl Area {
     pub fn of_files(files: Vec<TileFile>) -> Result<Self, ReadError> {
         let Some(first) = files.first() else { return Err(ReadError::NoFiles { path: Path::new("").into() }) };
         let frame = AreaFrame::of(first.header());
-        let mut file_of = HashMap::new();
+        let mut rows: BTreeMap<u32, Vec<(Range<u32>, u32)>> = BTreeMap::new();
         for (place, file) in (0..).zip(&files) {
             let header = file.header();
             if AreaFrame::of(header) != frame {
                 return Err(ReadError::OtherArea { file: format!("{file:?}"), first: format!("{first:?}") });
             }
-            let cols = header.west..header.east;
-            file_of
-                .extend((header.south..header.north).flat_map(|row| cols.clone().map(move |col| ([row, col], place))));
+            for row in header.south..header.north {
+                rows.entry(row).or_default().push((header.west..header.east, place));
+            }
         }
-        Ok(Self { files, file_of, frame })
+        Ok(Self { files, rows, frame })
+    }
+
+    /// The file of a load module, the last one where several hold it.
+    fn file_of(&self, row: u32, col: u32) -> Option<&TileFile> {
+        let mut from_last = self.rows.get(&row)?.iter().rev();
+        let (_, place) = from_last.find(|(cols, _)| cols.contains(&col))?;
+        self.files.get(*place as usize)
     }
 
     /// Where load modules lie.
@@ -98,7 +105,7 @@ impl Area {
             return Ok(());
         }
         let places = (block.south..block.north).flat_map(|row| (block.west..block.east).map(move |col| [row, col]));
-        let mut missing = places.filter(|place| !self.file_of.contains_key(place));
+        let mut missing = places.filter(|[row, col]| self.file_of(*row, *col).is_none());
         missing.next().map_or(Ok(()), |[row, col]| Err(ReadError::NoSuchModule { row, col }))
     }
 
@@ -112,10 +119,7 @@ impl Area {
     ) -> Result<(), ReadError> {
         let mut col = cols.start;
         while col < cols.end {
-            let place = self.file_of.get(&[row, col]);
-            let Some(file) = place.and_then(|&place| self.files.get(place as usize)) else {
-                return Err(ReadError::NoSuchModule { row, col });
-            };
+            let file = self.file_of(row, col).ok_or(ReadError::NoSuchModule { row, col })?;
             let end = cols.end.min(file.header().east);
             for module in file.row(level, row, col..end)? {
                 into(module.col, Arc::new(TerrainModule::new(module, self.frame.side)));

@@ -187,6 +187,11 @@ pub enum ReadError {
     },
     /// Ground was to be moved over an area that it was not loaded from.
     OtherGround,
+    /// A file is another than when its area was opened.
+    Changed {
+        /// Its path.
+        path: PathBuf,
+    },
     /// What should be a file is none, but a pipe, a device or a folder.
     NotAFile {
         /// Its path.
@@ -251,6 +256,9 @@ impl fmt::Display for ReadError {
                 write!(f, "{file}: found another area than that of {first}, expected files of one area")
             }
             Self::OtherGround => f.write_str("found ground of another area, expected the area it was loaded from"),
+            Self::Changed { path } => {
+                write!(f, "{}: found another file than when the area was opened, expected the same", path.display())
+            }
             Self::NotAFile { path } => {
                 write!(f, "{}: found a pipe, a device or a folder, expected a file", path.display())
             }

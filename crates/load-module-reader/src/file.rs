@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use crate::tile_file::open_file;
-use crate::{FILE_BYTES_MAX, Header, IndexEntry, Module, ReadError, Section, VERSION, index};
+use crate::{Block, FILE_BYTES_MAX, Header, IndexEntry, Module, ReadError, Section, VERSION, index};
 
 /// All load modules of one tile, decoded and checked.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,22 +40,22 @@ impl SlmFile {
     /// # Errors
     /// When anything in it is not as `docs/FORMAT.md` says.
     pub fn parse(bytes: &[u8]) -> Result<Self, ReadError> {
-        let found = bytes.len() as u64;
-        if FILE_BYTES_MAX < found {
-            return Err(ReadError::TooLarge { found, limit: FILE_BYTES_MAX });
-        }
-        let (header, header_length) = Header::parse(bytes, found)?;
-        let index = index::parse(bytes, &header, header_length, found)?;
-        let columns = header.west..header.east;
-        let places = || (header.south..header.north).flat_map(|row| columns.clone().map(move |col| (row, col)));
-        let of_levels = (0..header.level_count).flat_map(|level| places().map(move |place| (level, place)));
-        let modules = of_levels
-            .zip(&index)
-            .map(|((level, place), entry)| Module::parse(section(bytes, entry), &header, entry, level, place))
-            .collect::<Result<_, _>>()?;
+        let (header, index, modules) = parse(bytes, |_, _| true)?;
         let file = Self { header, index, modules };
         file.check_version()?;
         Ok(file)
+    }
+
+    /// The header of a file held in memory, and the load modules of a block that are in it, level by level, decoded and
+    /// checked; the bytes of no other are looked at.
+    ///
+    /// # Errors
+    /// When header, index or one of these load modules are not as `docs/FORMAT.md` says.
+    pub fn parse_part(bytes: &[u8], part: Block) -> Result<(Header, Vec<Vec<Module>>), ReadError> {
+        let (header, _, modules) = parse(bytes, |row, col| part.contains(row, col))?;
+        let mut levels = vec![Vec::new(); usize::from(header.level_count)];
+        modules.into_iter().for_each(|module| levels[usize::from(module.level)].push(module));
+        Ok((header, levels))
     }
 
     /// The same load modules have one file only: with decks alone it is of version 2.
@@ -95,6 +95,25 @@ impl SlmFile {
     pub fn module(&self, row: u32, col: u32) -> Option<&Module> {
         self.header.index_of(row, col).and_then(|index| self.modules.get(index))
     }
+}
+
+/// Header, index, and of the load modules those that are wanted by row and column, level by level.
+fn parse(bytes: &[u8], wanted: impl Fn(u32, u32) -> bool) -> Result<(Header, Vec<IndexEntry>, Vec<Module>), ReadError> {
+    let found = bytes.len() as u64;
+    if FILE_BYTES_MAX < found {
+        return Err(ReadError::TooLarge { found, limit: FILE_BYTES_MAX });
+    }
+    let (header, header_length) = Header::parse(bytes, found)?;
+    let index = index::parse(bytes, &header, header_length, found)?;
+    let columns = header.west..header.east;
+    let places = || (header.south..header.north).flat_map(|row| columns.clone().map(move |col| (row, col)));
+    let of_levels = (0..header.level_count).flat_map(|level| places().map(move |place| (level, place)));
+    let modules = of_levels
+        .zip(&index)
+        .filter(|((_, (row, col)), _)| wanted(*row, *col))
+        .map(|((level, place), entry)| Module::parse(section(bytes, entry), &header, entry, level, place))
+        .collect::<Result<_, _>>()?;
+    Ok((header, index, modules))
 }
 
 /// The bytes of one section and of what follows it. The index has been checked against the length of the file.

@@ -71,6 +71,17 @@ pub(crate) fn entry_bytes(version: u16) -> usize {
         }
 }
 
+/// Bytes of the index that follows a header of `header_length` bytes, where a file of `file_bytes` bytes has room.
+pub(crate) fn check_room(header: &Header, header_length: usize, file_bytes: u64) -> Result<u64, ReadError> {
+    let (offset, count) = (header_length as u64, header.module_count().saturating_mul(u64::from(header.level_count)));
+    let expected = count.saturating_mul(entry_bytes(header.version) as u64).saturating_add(4);
+    let found = file_bytes.saturating_sub(offset);
+    if found < expected {
+        return Err(ReadError::Truncated { section: Section::Index, offset, found, expected });
+    }
+    Ok(expected)
+}
+
 /// The index that follows a header of `header_length` bytes: level by level, row by row from the south-west. `file` is
 /// the beginning of a file of `file_bytes` bytes, and holds at least the index.
 pub(crate) fn parse(
@@ -80,14 +91,9 @@ pub(crate) fn parse(
     file_bytes: u64,
 ) -> Result<Vec<IndexEntry>, ReadError> {
     let base = header_length as u64;
-    let count = header.module_count().saturating_mul(u64::from(header.level_count));
-    let entry_bytes = entry_bytes(header.version);
-    let length = count.saturating_mul(entry_bytes as u64).saturating_add(4);
-    let rest = &file[header_length..];
-    if (rest.len() as u64) < length {
-        let found = rest.len() as u64;
-        return Err(ReadError::Truncated { section: Section::Index, offset: base, found, expected: length });
-    }
+    let length = check_room(header, header_length, file.len() as u64)?;
+    let (entry_bytes, rest) = (entry_bytes(header.version), &file[header_length..]);
+    let count = (length - 4) / entry_bytes as u64;
     // The file is at least as long, so the length fits.
     let bytes = &rest[..length as usize];
     check_section(bytes, base, Section::Index)?;

@@ -5,8 +5,8 @@
 //! a checksum, every length and offset has exactly one right value, and what the sections hold is checked too:
 //! what is returned is sound, and anything else is a [`ReadError`].
 //!
-//! [`Area`] opens all files of a database and reads only their headers and indexes. [`Area::load`] brings a [`Block`]
-//! of load modules into memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
+//! [`Area`] reads only the headers of all files of a database. [`Area::load`] brings a [`Block`] of load modules into
+//! memory as [`LoadedGround`], and [`LoadedGround::moved`] follows the observer and reads only
 //! what is new.
 //! Decks of bridges hang above the ground: [`LoadedGround::height_m`] is that of the ground,
 //! [`LoadedGround::height_below_m`] that of the topmost of ground and decks not above a ceiling, for vehicles that

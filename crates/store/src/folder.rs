@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::engine::{Disk, Entry, Store};
 use serde::de::DeserializeOwned;
-use terrain::{GainCurve, LoadModule, TileFeatures, TileId, TileTin};
+use terrain::{GainCurve, LoadModule, ModuleRect, TileFeatures, TileId, TileTin};
 
 use crate::frame::{FRAME_BYTES, Kind};
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
@@ -228,6 +228,22 @@ impl Folder {
         let (header, modules) = slm::decode_modules(&path, &self.read(&path)?)?;
         same_tile(path, header.tile, tile)?;
         Ok((header, modules))
+    }
+
+    /// The load modules of `tile` that lie in `part` at every level, the finest first, each sound, and what holds for
+    /// all of the tile. The others are not looked at.
+    ///
+    /// # Errors
+    /// When the file is missing or of another tile, or what is looked at is damaged or unsound.
+    pub fn read_part(
+        &self,
+        tile: TileId,
+        part: ModuleRect,
+    ) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+        let path = self.modules_path(tile);
+        let (header, levels) = slm::decode_part(&path, &self.read(&path)?, part)?;
+        same_tile(path, header.tile, tile)?;
+        Ok((header, levels))
     }
 
     /// What was measured of the load modules of `tile`, what those were made from, and the bytes that say so.

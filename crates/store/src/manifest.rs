@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::engine::Parts;
 use serde::{Deserialize, Serialize};
-use terrain::TileId;
+use terrain::{ModuleRect, TileId};
 
 use crate::{DatabaseError, Fingerprint, json};
 
@@ -75,6 +75,13 @@ pub struct Area {
 }
 
 impl Area {
+    /// The load modules of a tile; `None` where there is no such tile.
+    pub fn modules_of(&self, tile: TileId) -> Option<ModuleRect> {
+        let is_there = tile.row < self.tile_rows && tile.col < self.tile_cols;
+        let (modules, tiles) = ([self.module_rows, self.module_cols], [self.tile_rows, self.tile_cols]);
+        is_there.then(|| ModuleRect::of_tile(tile, modules, tiles))
+    }
+
     /// The first key in which `self` differs from `other`, with both values.
     pub fn difference(&self, other: &Area) -> Option<(&'static str, String, String)> {
         let pairs = [

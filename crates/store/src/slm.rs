@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use load_module_reader::{
-    DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, PART_DECKS, PART_LINES,
-    PART_OBJECTS, PARTS_ENTRY_BYTES, QUANTA_PER_METRE, SlmFile, VERSION, VERSION_OF_GROUND, VERSION_WITH_DECKS, Vertex,
+    Block, DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, PART_DECKS,
+    PART_LINES, PART_OBJECTS, PARTS_ENTRY_BYTES, QUANTA_PER_METRE, ReadError, SlmFile, VERSION, VERSION_OF_GROUND,
+    VERSION_WITH_DECKS, Vertex,
 };
 use terrain::{
     Decks, GridFrame, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine,
@@ -289,13 +290,36 @@ pub fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<Loa
 /// # Errors
 /// When the file is not as it was written, or a load module in it is not sound.
 pub fn decode_levels(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
-    let fault = |fault| DatabaseError::Modules { path: path.to_path_buf(), fault: Box::new(fault) };
-    let file = SlmFile::parse(bytes).map_err(fault)?;
-    let header = file.header();
-    let level = |level: u16| -> Vec<LoadModule> {
-        file.level(level).unwrap_or(&[]).iter().map(|module| load_module(module, header.side)).collect()
-    };
-    let levels: Vec<Vec<LoadModule>> = (0..header.level_count).map(level).collect();
+    let file = SlmFile::parse(bytes).map_err(damaged(path))?;
+    let levels = (0..file.header().level_count).map(|level| file.level(level).unwrap_or(&[]));
+    of_levels(path, file.header(), levels)
+}
+
+/// The same of the load modules of `part` alone: the others are not looked at.
+///
+/// # Errors
+/// When header or index are not as they were written, or a load module of the part is not sound.
+pub(crate) fn decode_part(
+    path: &Path,
+    bytes: &[u8],
+    ModuleRect { south, west, north, east }: ModuleRect,
+) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+    let part = Block { south, west, north, east };
+    let (header, levels) = SlmFile::parse_part(bytes, part).map_err(damaged(path))?;
+    of_levels(path, &header, levels.iter().map(Vec::as_slice))
+}
+
+fn damaged(path: &Path) -> impl Fn(ReadError) -> DatabaseError {
+    move |fault| DatabaseError::Modules { path: path.to_path_buf(), fault: Box::new(fault) }
+}
+
+fn of_levels<'a>(
+    path: &Path,
+    header: &Header,
+    levels: impl Iterator<Item = &'a [Module]>,
+) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+    let level = |modules: &[Module]| modules.iter().map(|module| load_module(module, header.side)).collect();
+    let levels: Vec<Vec<LoadModule>> = levels.map(level).collect();
     for module in levels.iter().flatten() {
         let unsound = |fault| DatabaseError::UnsoundModule { path: path.to_path_buf(), module: module.id, fault };
         module.check().map_err(unsound)?;

@@ -125,9 +125,47 @@ impl ModuleRect {
         self.east - self.west
     }
 
+    /// The one in its south-west.
+    pub fn south_west(&self) -> ModuleId {
+        ModuleId { row: self.south, col: self.west }
+    }
+
     /// All load modules inside.
     pub fn count(&self) -> usize {
         self.rows() as usize * self.cols() as usize
+    }
+
+    /// The least that holds two.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            south: self.south.min(other.south),
+            west: self.west.min(other.west),
+            north: self.north.max(other.north),
+            east: self.east.max(other.east),
+        }
+    }
+
+    /// What two rectangles have in common; `None` where that is nothing.
+    pub fn intersection(self, other: Self) -> Option<Self> {
+        let both = Self {
+            south: self.south.max(other.south),
+            west: self.west.max(other.west),
+            north: self.north.min(other.north),
+            east: self.east.min(other.east),
+        };
+        (both.south < both.north && both.west < both.east).then_some(both)
+    }
+
+    /// Those of `tile`, where an area of so many rows and columns is divided into so many rows and columns of tiles:
+    /// the lines between these lie at `ceil(k * rows / tile rows)`.
+    ///
+    /// # Panics
+    /// When there are no tiles.
+    pub fn of_tile(tile: TileId, [rows, cols]: [u32; 2], [tile_rows, tile_cols]: [u32; 2]) -> Self {
+        let line = |k: u32, all: u32, tiles: u32| (u64::from(k) * u64::from(all)).div_ceil(u64::from(tiles)) as u32;
+        let (south, north) = (line(tile.row, rows, tile_rows), line(tile.row + 1, rows, tile_rows));
+        let (west, east) = (line(tile.col, cols, tile_cols), line(tile.col + 1, cols, tile_cols));
+        Self { south, west, north, east }
     }
 
     /// Whether `module` lies inside.

@@ -1,9 +1,14 @@
 //! How long a run still takes: what its stages are forecast to take, set right by what they have taken so far.
 
+use std::collections::BTreeMap;
+
 use build::{Event, Plan, Stage};
+use terrain::TileId;
 
 /// Seconds of measuring that a forecast is worth: machines differ, and the first tiles may be the quick ones.
 const TRUST_S: f64 = 1.0;
+/// Tiles, the last ones, that tell how many of the next are kept: a build that goes on keeps those at its beginning.
+const RECENT: usize = 32;
 
 /// Listens to a run and says what is left of it.
 #[derive(Debug)]
@@ -18,6 +23,12 @@ pub struct Estimate {
     tiles: (usize, usize, usize),
     /// Share of tiles that the last stage by tiles worked on; what is kept takes no time, in later stages neither.
     share: f64,
+    /// The same of the last tiles of the current stage.
+    recent: f64,
+    /// When each tile at work was begun.
+    begun: BTreeMap<TileId, f64>,
+    /// Seconds that went by while tiles were kept: they tell nothing of those that are worked on.
+    kept_s: f64,
     /// Forecast seconds of what was worked on.
     worked_s: f64,
 }
@@ -43,7 +54,8 @@ impl Estimate {
     }
 
     fn new(stages: Vec<(Stage, f64)>) -> Self {
-        Self { stages, pace: None, begun_s: None, tiles: (0, 0, 0), share: 1.0, worked_s: 0.0 }
+        let (begun, tiles) = (BTreeMap::new(), (0, 0, 0));
+        Self { stages, pace: None, begun_s: None, tiles, share: 1.0, recent: 1.0, begun, kept_s: 0.0, worked_s: 0.0 }
     }
 
     /// Takes note of what happened, so many seconds after the start.
@@ -59,11 +71,20 @@ impl Estimate {
                     self.stages.drain(..at);
                 }
             }
-            Event::Done(stage, _) => {
+            Event::Started(_, tile) => drop(self.begun.insert(*tile, at_s)),
+            Event::Done(stage, tile) => {
+                self.begun.remove(tile);
                 self.tiles.1 += 1;
+                self.pass_tile(1.0);
                 self.worked_s += self.seconds(*stage).unwrap_or(0.0) / self.tiles.0.max(1) as f64;
             }
-            Event::Kept(..) => self.tiles.2 += 1,
+            Event::Kept(_, tile) => {
+                // Of the time of several tiles at once each has its part.
+                let at_once = self.begun.len().max(1) as f64;
+                self.kept_s += self.begun.remove(tile).map_or(0.0, |begun_s| at_s - begun_s) / at_once;
+                self.tiles.2 += 1;
+                self.pass_tile(0.0);
+            }
             Event::Leave(stage) => {
                 let (all, done, _) = self.tiles;
                 if 0 < all {
@@ -74,13 +95,18 @@ impl Estimate {
                 self.stages.retain(|(known, _)| known != stage);
                 self.tiles = (0, 0, 0);
             }
-            Event::Started(..) | Event::Because(..) | Event::Note(_) => {}
+            Event::Because(..) | Event::Note(_) => {}
         }
+    }
+
+    fn pass_tile(&mut self, worked: f64) {
+        let (_, done, kept) = self.tiles;
+        self.recent += (worked - self.recent) / (done + kept).min(RECENT) as f64;
     }
 
     /// Seconds that are left; `None` where there is nothing to tell them from.
     pub fn left_s(&self, at_s: f64) -> Option<f64> {
-        let passed_s = at_s - self.begun_s?;
+        let passed_s = at_s - self.begun_s? - self.kept_s;
         let pace = match self.pace {
             Some(pace) => (passed_s + TRUST_S) / (self.worked_s + TRUST_S / pace),
             None if 0.0 < self.worked_s => passed_s / self.worked_s,
@@ -92,7 +118,7 @@ impl Estimate {
         for (place, (stage, seconds)) in self.stages.iter().enumerate() {
             let is_current = place == 0 && 0 < all;
             if is_current && 0 < done + kept {
-                share = done as f64 / (done + kept) as f64;
+                share = self.recent;
             }
             let open = if is_current { all.saturating_sub(done + kept) as f64 / all as f64 } else { 1.0 };
             // The page shows kept tiles, too.
@@ -109,7 +135,6 @@ impl Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::TileId;
 
     const TILE: TileId = TileId { row: 0, col: 0 };
 
@@ -147,6 +172,29 @@ mod tests {
         estimate.hear(&Event::Leave(Stage::Survey), 0.0);
         estimate.hear(&Event::Enter(Stage::Refine, 10), 0.0);
         assert_eq!(estimate.left_s(0.0), Some(1.0), "only the page is left");
+    }
+
+    #[test]
+    fn a_build_that_goes_on_is_told_by_the_tiles_that_it_makes_itself() {
+        let mut estimate = build();
+        estimate.hear(&Event::Enter(Stage::Refine, 100), 0.0);
+        // Two at a time: 50 tiles are kept in 50 s, then 40 made in 16 s, as forecast for two workers.
+        let tile = |number: u32| TileId { row: 0, col: number };
+        for pair in 0..45 {
+            let [from_s, to_s] = [0, 1].map(|next| match pair + next {
+                of @ ..=25 => 2.0 * f64::from(of),
+                of => 50.0 + 0.8 * f64::from(of - 25),
+            });
+            let pair = [tile(2 * pair), tile(2 * pair + 1)];
+            pair.iter().for_each(|tile| estimate.hear(&Event::Started(Stage::Refine, *tile), from_s));
+            for tile in pair {
+                let event = if tile.col < 50 { Event::Kept } else { Event::Done };
+                estimate.hear(&event(Stage::Refine, tile), to_s);
+            }
+        }
+        // 10 tiles, the load modules and the page.
+        let (left_s, expected_s) = (estimate.left_s(66.0).unwrap(), (8.0 + 10.0 + 2.0) / 2.0);
+        assert!((left_s - expected_s).abs() < 0.05 * expected_s, "{left_s}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use fidelity::each_residual;
 use job::Job;
 use schedule::Workers;
 use store::{AreaLevel, FeatureRemark, Folder, Manifest};
-use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleRect, Post, PostRect, TileId};
+use terrain::{Dem, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleRect, Post, PostRect, TileId};
 use views::NO_RESIDUAL;
 
 use crate::product::{Opened, ProductError, choose_ground, read_told};
@@ -105,7 +105,7 @@ impl Product {
             Some((job, name)) => Some((Ground::open_built(&job, area, (&workers, &stop), folder)?, name)),
             None => None,
         };
-        let meets = |tile: &TileId| meet(area.tiling.modules(*tile, area.grid), part).is_some();
+        let meets = |tile: &TileId| area.tiling.modules(*tile, area.grid).intersection(part).is_some();
         let tiles: Vec<TileId> = area.tiles.iter().copied().filter(meets).collect();
         let read =
             |_: usize, &tile: &TileId| read_tile(folder, area, ground.as_ref().map(|(ground, _)| ground), part, tile);
@@ -124,6 +124,52 @@ impl Product {
         let (grid, frame, tiles) = (area.grid, area.frame, planned_tiles(area));
         let features = read_told(opened)?.map(|(level, told)| (level, told.remarks));
         Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground, features })
+    }
+
+    /// The load modules of a part, row by row from the south-west, and nothing else of the database.
+    ///
+    /// # Errors
+    /// When one is missing or damaged.
+    pub fn modules_in(opened: &Opened, part: ModuleRect) -> Result<Vec<LoadModule>, ProductError> {
+        let Opened { folder, area, .. } = opened;
+        let [low, high] = [part.south_west(), ModuleId { row: part.north - 1, col: part.east - 1 }]
+            .map(|corner| area.tiling.tile_of_module(corner, area.grid));
+        let mut modules = Vec::with_capacity(part.count());
+        for (row, col) in (low.row..=high.row).flat_map(|row| (low.col..=high.col).map(move |col| (row, col))) {
+            modules.append(&mut folder.read_part(TileId { row, col }, part)?.1[0]);
+        }
+        modules.sort_by_key(|module| module.id);
+        check_complete(&modules, part, folder)?;
+        Ok(modules)
+    }
+
+    /// What `each` makes of the load modules of each of these parts, and of the ground under them where it is wanted:
+    /// of each part by itself, so that no more is held at once than workers are at.
+    ///
+    /// # Errors
+    /// As [`Product::read`].
+    pub fn each_part<R: Send>(
+        opened: &Opened,
+        wanted: WantedGround,
+        parts: &[ModuleRect],
+        workers: usize,
+        each: impl Fn(&[LoadModule], Option<&Window>) -> R + Sync,
+    ) -> Result<Vec<R>, ProductError> {
+        let Opened { folder, area, .. } = opened;
+        let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
+        let ground = match open_ground(opened, wanted)? {
+            Some((job, _)) => Some(Ground::open_built(&job, area, (&workers, &stop), folder)?),
+            None => None,
+        };
+        let tiles: Vec<TileId> =
+            parts.iter().map(|part| area.tiling.tile_of_module(part.south_west(), area.grid)).collect();
+        let read = |_: usize, part: &ModuleRect| -> Result<R, ProductError> {
+            let modules = Self::modules_in(opened, *part)?;
+            let window = ground.as_ref().map(|ground| ground.window(area.grid.posts_of_rect(*part))).transpose()?;
+            Ok(each(&modules, window.as_ref()))
+        };
+        schedule::for_each_independent(parts, &workers, &stop, read)
+            .map_err(|error| GroundError::from_schedule(&tiles, error))
     }
 
     /// What limits count, in every load module and window.
@@ -182,17 +228,6 @@ fn check_complete(modules: &[LoadModule], part: ModuleRect, folder: &Folder) -> 
     ))
 }
 
-/// What two rectangles have in common.
-fn meet(a: ModuleRect, b: ModuleRect) -> Option<ModuleRect> {
-    let both = ModuleRect {
-        south: a.south.max(b.south),
-        west: a.west.max(b.west),
-        north: a.north.min(b.north),
-        east: a.east.min(b.east),
-    };
-    (both.south < both.north && both.west < both.east).then_some(both)
-}
-
 /// One tile's share of a part.
 struct TilePiece {
     modules: Vec<LoadModule>,
@@ -212,9 +247,8 @@ fn read_tile(
     part: ModuleRect,
     tile: TileId,
 ) -> Result<TilePiece, ProductError> {
-    let (_, mut modules) = folder.read_modules(tile)?;
-    modules.retain(|module| part.contains(module.id));
-    let inside = meet(area.tiling.modules(tile, area.grid), part).expect("only tiles of the part are read");
+    let inside = area.tiling.modules(tile, area.grid).intersection(part).expect("only tiles of the part are read");
+    let modules = folder.read_part(tile, part)?.1.swap_remove(0);
     let ground = match ground {
         Some(ground) => {
             let window = ground.window(area.grid.posts_of_rect(inside))?;

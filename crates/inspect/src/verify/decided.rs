@@ -9,7 +9,6 @@ use terrain::Role;
 use terrain::{LatticePoint, ModuleId, QUANTA_PER_METRE, SurfaceGround, TileFeatures, Vertex};
 
 use super::laid::place_text;
-use super::modules::Modules;
 
 /// A ring with its class, its corners in ascending order.
 type Ring = (u8, Vec<(LatticePoint, i32)>);
@@ -57,14 +56,19 @@ impl<'a> Decided<'a> {
         Some(format!("survey/{}.lines: a vertex has another height than in the tile beside it, {place}", features.tile))
     }
 
-    /// What is wrong with `level`, and, where a report lists them, with figures that follow from it.
-    pub fn problems(&self, level: &AreaLevel, modules: &Modules, listed: Option<&ReportFeatureChecks>) -> Vec<String> {
+    /// What is wrong with `level`, where load modules have so many triangles of decks, and, where a report lists them, with figures that follow from it.
+    pub fn problems(
+        &self,
+        level: &AreaLevel,
+        decks: &BTreeMap<ModuleId, u32>,
+        listed: Option<&ReportFeatureChecks>,
+    ) -> Vec<String> {
         let mut problems = Vec::new();
         problems.extend(self.differing_lines(level));
         problems.extend(self.differing_decks(level));
         problems.extend(level.lines.iter().filter_map(|line| self.rising(line)));
         problems.extend(self.differing_cost(level));
-        problems.extend(self.differing_reserved(level, modules));
+        problems.extend(self.differing_reserved(level, decks));
         problems.extend(self.differing_strips(level));
         problems.extend(listed.into_iter().flat_map(|listed| self.differing_checks(level, listed)));
         problems
@@ -231,7 +235,7 @@ impl<'a> Decided<'a> {
 
     /// What is reserved in each load module: what vertices come to, but for those on posts of the outer border that are
     /// there anyway, and the decks that it has.
-    fn differing_reserved(&self, level: &AreaLevel, modules: &Modules) -> Option<String> {
+    fn differing_reserved(&self, level: &AreaLevel, decks: &BTreeMap<ModuleId, u32>) -> Option<String> {
         let (grid, rect) = (self.area.grid, self.area.rect);
         let side = self.steps * grid.side_cells;
         let mut anyway: BTreeMap<(i32, i32), u32> = BTreeMap::new();
@@ -245,7 +249,7 @@ impl<'a> Decided<'a> {
         let (triangles, reserved) = (self.of_vertices(level), level.reserved_of(grid.count()));
         let is_wrong = |id: &ModuleId| {
             let at = (id.row as i32, id.col as i32);
-            let decks = modules.get(id).map_or(0, |module| module.decks.triangles.len() as u32);
+            let decks = decks.get(id).copied().unwrap_or(0);
             let all = triangles.get(&at).copied().unwrap_or(0) + decks;
             let least = all - anyway.get(&at).copied().unwrap_or(0).min(all);
             // Decks may have two corners more, each of two triangles, where ground stands above them.

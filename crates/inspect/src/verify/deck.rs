@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use fidelity::DeckFigures;
 use terrain::{FeatureSurface, LatticePoint, ModuleVertex, QUANTA_PER_METRE};
 
-use super::modules::Modules;
 use super::square::{At, Square, is_on, turn};
+use super::walk::LevelSums;
 
 /// Quanta that rounding may put a deck above the ground onto which it was raised: 5 cm.
 const ROUNDING: f64 = 6.4;
@@ -18,15 +18,10 @@ const OF_NONE: &str = "a corner of decks is that of no bridge";
 
 /// What all decks come to, in words: square metres and the least height over each class at the finest level, and what
 /// lies under the ground at the level that has most of it. That limits and the ground left some there is no damage.
-pub(crate) fn told(levels: &[Modules], classes: &[String]) -> Option<String> {
-    let of_level = |modules: &Modules| {
-        let mut all = DeckFigures::default();
-        modules.values().for_each(|module| all.merge(&DeckFigures::of(module)));
-        all
-    };
-    let by_level: Vec<DeckFigures> = levels.iter().map(of_level).collect();
+pub(crate) fn told(levels: &[LevelSums], classes: &[String]) -> Option<String> {
+    let by_level: Vec<&DeckFigures> = levels.iter().map(|sums| &sums.decks).collect();
     let worst = by_level.iter().max_by_key(|figures| (figures.under, figures.deepest))?;
-    let all = &by_level[0];
+    let all = by_level[0];
     let metres = |quanta: f64| quanta / f64::from(QUANTA_PER_METRE);
     let under = match worst.under {
         0 => "none of them under the ground".to_owned(),

@@ -6,7 +6,6 @@ use store::{Folder, Manifest, Report, ReportBreach, ReportPlace, TileState, file
 use terrain::ModuleId;
 
 use super::entries::state_word;
-use super::modules::Modules;
 use super::total::Total;
 use crate::recount;
 use build::ground::GamingArea;
@@ -30,11 +29,6 @@ impl std::fmt::Display for Exceeded {
         };
         write!(f, "{place}: {count} against limits.{kind} = {limit}")
     }
-}
-
-/// What the limits count, for each load module of the area, row by row.
-pub(crate) fn counts(job: &Job, area: &GamingArea, modules: &Modules) -> Vec<u32> {
-    area.grid.all().iter().map(|module| modules.get(&module).map_or(0, |module| job.counted(module))).collect()
 }
 
 /// Every limit of a count that is exceeded: of load modules when the pool is used up, smallest excess first, of

@@ -1,13 +1,13 @@
 //! Roads and water: the files of the stages that decide them, what is in the load modules, what the report says.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use build::ground::GamingArea;
 use build::product::{Opened, Told, features_file, locate_features, read_told};
 use job::Job;
 use serde_json::Value;
 use store::{AreaLevel, Folder, Manifest, Report, ReportFeatures, SourceRecord, files};
-use terrain::QUANTA_PER_METRE;
+use terrain::{ModuleId, QUANTA_PER_METRE};
 
 use super::decided::Decided;
 use super::figures::is_of_other_ground;
@@ -60,7 +60,7 @@ pub(crate) fn check(
     manifest: &Manifest,
     job: &Job,
     area: &GamingArea,
-    modules: &Modules,
+    (modules, decks): (&Modules, &BTreeMap<ModuleId, u32>),
     report: Option<&Report>,
 ) -> Result<Found, CompileError> {
     let listed = report.and_then(|report| report.features.as_ref());
@@ -92,7 +92,7 @@ pub(crate) fn check(
     if !problems.is_empty() {
         return Ok(Found { problems, unchecked: Vec::new(), network: Some(network) });
     }
-    problems.extend(decided.problems(&level, modules, listed.map(|features| &features.checks)));
+    problems.extend(decided.problems(&level, decks, listed.map(|features| &features.checks)));
     let opened = Opened::of(folder.clone(), manifest.clone())?;
     if let (Some(report), Some((_, told)), true) = (report, read_told(&opened)?, problems.is_empty()) {
         let mut others = differing(report.features.as_ref(), &told.report);

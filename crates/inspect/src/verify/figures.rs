@@ -1,15 +1,18 @@
 //! Sums over the load modules, added up again in 128 bits, against what `measured/`, `database.json` and the report
 //! say.
 
+use std::rc::Rc;
+
 use fidelity::Residuals;
 use job::Job;
 use store::{Folder, Manifest, Measured, MeasuredModule, MeasuredTally, Report, ReportResidual};
-use terrain::{LoadModule, ModuleCounts, ModuleId, ModuleResidual, StopReason, metres_of_quanta};
+use terrain::{LoadModule, ModuleCounts, ModuleResidual, StopReason, metres_of_quanta};
 
 use super::exceeded::Exceeded;
 use super::modules::Modules;
 use super::tins::OfTins;
 use super::total::{Total, squares};
+use super::walk::LevelSums;
 use crate::recount;
 use build::ground::GamingArea;
 use build::{Adding, Sums, limit_of, residual_of, sums_of};
@@ -17,15 +20,12 @@ use build::{Adding, Sums, limit_of, residual_of, sums_of};
 /// The first revision that measures the heights of all levels, not of the finest alone.
 const ALL_LEVELS_SINCE: u32 = 10;
 
-/// Statistics of load modules that no residuals of that many posts have.
-pub(crate) fn impossible(area: &GamingArea, modules: &Modules) -> Vec<String> {
-    let is_possible = |module: &LoadModule| {
-        let ModuleResidual { posts, largest, sum_abs, sum_squared } = module.residual;
-        let owned = area.grid.posts_of(module.id).post_count() as u128;
-        u128::from(posts) <= owned && is_possible(posts.into(), largest, sum_abs.into(), sum_squared.into())
-    };
-    let wrong = modules.values().filter(|module| !is_possible(module));
-    wrong.map(|module| format!("load module {}: no residuals have the sums in its file", module.id)).collect()
+/// Statistics of a load module that no residuals of that many posts have.
+pub(crate) fn impossible(area: &GamingArea, module: &LoadModule) -> Option<String> {
+    let ModuleResidual { posts, largest, sum_abs, sum_squared } = module.residual;
+    let owned = area.grid.posts_of(module.id).post_count() as u128;
+    let possible = u128::from(posts) <= owned && is_possible(posts.into(), largest, sum_abs.into(), sum_squared.into());
+    (!possible).then(|| format!("load module {}: no residuals have the sums in its file", module.id))
 }
 
 /// Whether `posts` numbers up to `largest` can have these sums.
@@ -63,11 +63,10 @@ pub(crate) fn measured(
                 continue;
             }
         };
-        let ids: Vec<ModuleId> = area.tiling.modules(tile, area.grid).iter().collect();
-        let of_tile: Vec<&LoadModule> =
-            levels.iter().flat_map(|level| ids.iter().filter_map(|id| level.get(id))).collect();
+        let of_tile: Vec<Rc<LoadModule>> = levels.iter().flat_map(|level| level.of_tile(tile)).collect();
         let of_files = (record.slm, manifest.algorithm_revision);
-        let wrong = differing(&read, of_files, &of_tile, ids.len(), points);
+        let finest = area.tiling.modules(tile, area.grid).count();
+        let wrong = differing(&read, of_files, &of_tile, finest, points);
         problems.extend(wrong.into_iter().map(|what| format!("measured/{tile}.sums: {what}")));
         if problems.is_empty() {
             adding.add(sums_of(read));
@@ -79,7 +78,7 @@ pub(crate) fn measured(
 fn differing(
     read: &Measured,
     (slm, revision): (Option<store::FileStamp>, u32),
-    modules: &[&LoadModule],
+    modules: &[Rc<LoadModule>],
     finest: usize,
     points: u64,
 ) -> Vec<&'static str> {
@@ -124,18 +123,17 @@ fn numbers(module: &LoadModule) -> MeasuredModule {
 pub(crate) fn differing_totals(
     manifest: &Manifest,
     area: &GamingArea,
-    modules: &Modules,
+    sums: &LevelSums,
     (counts, exceeded): (&[u32], &[Exceeded]),
     tins: &OfTins,
 ) -> Vec<String> {
-    let residual = Total::of(modules.values().map(|module| module.residual));
-    let sum = |of: fn(&LoadModule) -> u128| modules.values().map(of).sum::<u128>();
+    let residual = sums.residual;
     let over = counts.iter().filter(|&&count| area.budget.per_module < count).count();
     let totals = &manifest.totals;
     let pairs = [
         ("points", tins.points.iter().map(|&points| u128::from(points)).sum(), totals.points),
-        ("triangles", sum(|module| module.counts().triangles.into()), totals.triangles),
-        ("polygons", sum(|module| module.counts().polygons.into()), totals.polygons),
+        ("triangles", sums.triangles.into(), totals.triangles),
+        ("polygons", sums.polygons.into(), totals.polygons),
         ("load modules above the limit", over as u128, totals.modules_over),
         ("limits exceeded", exceeded.len() as u128, totals.breaches),
         ("refused posts", tins.refused.iter().map(|&count| u128::from(count)).sum(), totals.refused),
@@ -158,7 +156,7 @@ pub(crate) fn differing_report(
     report: &Report,
     job: &Job,
     area: &GamingArea,
-    levels: &[Modules],
+    levels: &[LevelSums],
     (counts, tins, sums): (&[u32], &OfTins, Option<&Sums>),
 ) -> Vec<String> {
     let mut figures = Figures::default();
@@ -166,7 +164,7 @@ pub(crate) fn differing_report(
     of_points(&mut figures, report, area, tins);
     of_levels(&mut figures, report, job, levels);
     if let Some(sums) = sums.filter(|_| !is_of_other_ground(report)) {
-        of_residuals(&mut figures, report, job, area, &levels[0], sums);
+        of_residuals(&mut figures, report, job, &levels[0], sums);
     }
     let mut problems = figures.problems();
     if report.area != job.area.name {
@@ -226,18 +224,14 @@ impl Figures {
     }
 }
 
-fn of_counts(figures: &mut Figures, report: &Report, job: &Job, area: &GamingArea, modules: &Modules, counts: &[u32]) {
+fn of_counts(figures: &mut Figures, report: &Report, job: &Job, area: &GamingArea, sums: &LevelSums, counts: &[u32]) {
     let budget = &area.budget;
     let limit = u64::from(budget.per_module);
     let all: u64 = counts.iter().map(|&count| u64::from(count)).sum();
     let over = |count: &&u32| limit < u64::from(**count);
     let above: u64 = counts.iter().map(|&count| u64::from(count).saturating_sub(limit)).sum();
-    figures.count(
-        "triangles",
-        modules.values().map(|m| u64::from(m.counts().triangles)).sum::<u64>(),
-        report.triangles,
-    );
-    figures.count("polygons", modules.values().map(|m| u64::from(m.counts().polygons)).sum::<u64>(), report.polygons);
+    figures.count("triangles", sums.triangles, report.triangles);
+    figures.count("polygons", sums.polygons, report.polygons);
     let listed = &report.per_load_module;
     figures.number("per_load_module.mean", all as f64 / counts.len() as f64, listed.mean);
     figures.number("per_load_module.mean_limit", job.limits.mean_per_load_module, listed.mean_limit);
@@ -277,23 +271,22 @@ fn of_points(figures: &mut Figures, report: &Report, area: &GamingArea, tins: &O
     figures.count("stops.exhausted", stopped(StopReason::Exhausted), report.stops.exhausted);
 }
 
-fn of_levels(figures: &mut Figures, report: &Report, job: &Job, levels: &[Modules]) {
+fn of_levels(figures: &mut Figures, report: &Report, job: &Job, levels: &[LevelSums]) {
     let wanted = if job.lod.inner_shares.is_empty() { 0 } else { levels.len() };
     figures.count("number of levels", wanted, report.levels.len() as u64);
     let shares = std::iter::once(1.0).chain(job.lod.inner_shares.iter().copied());
-    for ((at, listed), (modules, share)) in report.levels.iter().enumerate().zip(levels.iter().zip(shares)) {
+    for ((at, listed), (sums, share)) in report.levels.iter().enumerate().zip(levels.iter().zip(shares)) {
         let key = |name: &str| format!("levels[{at}].{name}");
-        let total = Total::of(modules.values().map(|module| module.residual));
-        let triangles: u64 = modules.values().map(|module| u64::from(module.counts().triangles)).sum();
+        let total = sums.residual;
         figures.count(&key("level"), at, listed.level.into());
         figures.number(&key("inner_share"), share, listed.inner_share);
-        figures.count(&key("triangles"), triangles, listed.triangles);
+        figures.count(&key("triangles"), sums.triangles, listed.triangles);
         figures.number(&key("rms_m"), total.rms_m(), listed.rms_m);
         figures.number(&key("max_m"), total.max_m(), listed.max_m);
     }
 }
 
-fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &GamingArea, modules: &Modules, sums: &Sums) {
+fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, finest: &LevelSums, sums: &Sums) {
     let total = sums.residuals.total();
     figures.residual("residual", &residual_of(&total), &report.residual);
     if let (Some(found), Some(listed)) = (limit_of(&sums.curvature, report.triangles, &total), &report.limit) {
@@ -311,11 +304,8 @@ fn of_residuals(figures: &mut Figures, report: &Report, job: &Job, area: &Gaming
         figures.residual("residual_against_source", &residual_of(found), listed);
     }
     if let Some(listed) = &report.border {
-        let grid = area.grid;
-        let is_outer = |id: ModuleId| id.row == 0 || id.col == 0 || id.row + 1 == grid.rows || id.col + 1 == grid.cols;
-        for (name, wanted, listed) in [("at_border", true, &listed.at_border), ("inside", false, &listed.inside)] {
-            let part = modules.values().filter(|module| is_outer(module.id) == wanted);
-            let part = Total::of(part.map(|module| module.residual));
+        let parts = [("at_border", finest.at_border, &listed.at_border), ("inside", finest.inside, &listed.inside)];
+        for (name, part, listed) in parts {
             figures.count(&format!("border.{name}.posts"), part.posts, listed.posts);
             figures.number(&format!("border.{name}.rms_m"), part.rms_m(), listed.rms_m);
             figures.number(&format!("border.{name}.max_m"), part.max_m(), listed.max_m);

@@ -30,7 +30,7 @@ impl Laid<'_> {
         let mut problems = Vec::new();
         for id in self.area.tiling.modules(self.features.tile, self.area.grid).iter() {
             let Some(module) = modules.get(&id) else { continue };
-            let square = Square::of(module);
+            let square = Square::of(&module);
             let found = [
                 kept.lacking_vertex(&square),
                 kept.lacking_edge(&square),

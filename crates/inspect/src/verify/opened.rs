@@ -1,54 +1,44 @@
 //! The load-module files as a simulator opens them, with `load-module-reader`; each header against the job.
 
-use std::collections::BTreeMap;
-
 use job::Job;
-use load_module_reader::{Header, Module, SlmFile};
-use store::{DatabaseError, Fingerprint, Folder, load_module};
-use terrain::{HOLE_CLASS, TileId};
+use load_module_reader::{Header, Keep, TileFile};
+use store::{DatabaseError, Fingerprint, Folder};
+use terrain::{HOLE_CLASS, LoadModule, TileId};
 
-use super::modules::{Modules, at_level};
+use super::modules::at_level;
 use build::CompileError;
 use build::database_area;
 use build::ground::GamingArea;
 
-/// What the load-module files of a database hold.
+/// What the headers of the load-module files of a database say.
 pub(crate) struct Opened {
-    /// Load modules by level, the finest first: as many as the job has, or as a file has where those are more.
-    pub levels: Vec<Modules>,
+    /// Levels: as many as the job has, or as a file has where those are more.
+    pub level_count: usize,
     /// What each tile's file says that it was made from.
     pub fingerprints: Vec<Fingerprint>,
-    /// Headers and classes that are not as the job says.
-    pub problems: Vec<String>,
+    /// What is not as the job says in the header of each tile.
+    pub problems: Vec<Vec<String>>,
 }
 
-/// Opens the file of every tile.
+/// Reads the header of every tile's file.
 ///
 /// # Errors
 /// When one cannot be read.
 pub(crate) fn open(folder: &Folder, job: &Job, area: &GamingArea) -> Result<Opened, CompileError> {
     let mut opened = Opened {
-        levels: vec![BTreeMap::new(); job.lod.level_count()],
+        level_count: job.lod.level_count(),
         fingerprints: Vec::with_capacity(area.tiles.len()),
-        problems: Vec::new(),
+        problems: Vec::with_capacity(area.tiles.len()),
     };
     for &tile in &area.tiles {
         let path = folder.modules_path(tile);
-        let file = SlmFile::open(&path)
+        let file = TileFile::open(&path, Keep::OnDisk)
             .map_err(|fault| DatabaseError::Modules { path: path.clone(), fault: Box::new(fault) })?;
         let header = file.header();
         let differing = differing(header, job, area, tile);
-        opened.problems.extend(differing.into_iter().map(|what| format!("modules/{tile}.slm: {what}")));
+        opened.problems.push(differing.into_iter().map(|what| format!("modules/{tile}.slm: {what}")).collect());
         opened.fingerprints.push(Fingerprint(header.fingerprint));
-        let count = opened.levels.len().max(usize::from(header.level_count));
-        opened.levels.resize_with(count, BTreeMap::new);
-        for (level, modules) in (0..header.level_count).zip(&mut opened.levels) {
-            for module in file.level(level).unwrap_or(&[]) {
-                opened.problems.extend(unknown_class(module, job.class_names().len()));
-                let module = load_module(module, header.side);
-                modules.insert(module.id, module);
-            }
-        }
+        opened.level_count = opened.level_count.max(usize::from(header.level_count));
     }
     Ok(opened)
 }
@@ -80,14 +70,13 @@ fn differing(header: &Header, job: &Job, area: &GamingArea, tile: TileId) -> Vec
     wrong.map(|(field, found, expected)| format!("its header says {field} {found}, the job {expected}")).collect()
 }
 
-/// The first triangle of the ground, or else of decks, whose class the job does not have.
-fn unknown_class(module: &Module, count: usize) -> Option<String> {
+/// The first triangle of the ground at a level, or else of decks, whose class is none of so many that the job has.
+pub(crate) fn unknown_class(level: usize, module: &LoadModule, count: usize) -> Option<String> {
     let is_unknown = |&class: &u8| class != HOLE_CLASS && count <= usize::from(class);
     let of = |what: &str, classes: &[u8]| {
         let triangle = classes.iter().position(is_unknown)?;
         Some(format!("{what} {triangle} has class {}, the job has {count}", classes[triangle]))
     };
     let what = of("triangle", &module.classes).or_else(|| of("triangle of decks", &module.decks.classes))?;
-    let text = format!("load module {},{}: {what}", module.row, module.col);
-    Some(at_level(usize::from(module.level), text))
+    Some(at_level(level, format!("load module {}: {what}", module.id)))
 }

@@ -3,10 +3,11 @@
 //! corners of the ground; nothing is shared with the code that stands objects.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use job::ObjectsSpec;
 use store::{AreaOutlines, ModuleOutlines, ReportObjects};
-use terrain::{Corner, LoadModule, ModuleId, Objects, Prism, QUANTA_PER_METRE};
+use terrain::{Corner, LoadModule, ModuleId, ObjectKind, Objects, Prism, QUANTA_PER_METRE};
 
 use super::modules::Modules;
 use crate::recount;
@@ -44,8 +45,15 @@ pub(crate) fn check(
         .collect();
     let nothing = Objects::default();
     let mut pieces: BTreeMap<u64, Vec<Piece>> = BTreeMap::new();
-    for (id, module) in &levels[0] {
-        let granted = granted.get(id).copied().unwrap_or(&nothing);
+    let mut kinds: BTreeMap<ObjectKind, BTreeSet<u64>> = BTreeMap::new();
+    let mut counts = vec![0; area.grid.count()];
+    for module in levels[0].values() {
+        let id = module.id;
+        counts[area.grid.index(id)] = polygons(&module);
+        for (kind, thing) in things(&module.objects) {
+            kinds.entry(kind).or_default().insert(thing);
+        }
+        let granted = granted.get(&id).copied().unwrap_or(&nothing);
         if !are_alike(&module.objects, granted) {
             problems.push(format!("load module {id}: what stands there is not what had room"));
             continue;
@@ -54,31 +62,33 @@ pub(crate) fn check(
             if let Some(fault) = torn(prism, module.side) {
                 problems.push(format!("load module {id}: {} {:016x}: {fault}", prism.kind, prism.id));
             }
-            let ground = ground_under(prism, levels.iter().filter_map(|modules| modules.get(id)));
+            let ground = ground_under(prism, levels.iter().filter_map(|modules| modules.get(&id)));
             let lifted = granted.prisms.iter().find(|other| other.id == prism.id).map(|other| [other.base, other.roof]);
             pieces.entry(prism.id).or_default().push(Piece {
-                id: *id,
-                prism,
+                id,
+                kind: prism.kind,
+                base: prism.base,
+                roof: prism.roof,
                 ground,
                 lifted: lifted.unwrap_or([0; 2]),
             });
         }
     }
-    problems.extend(pieces.values().flat_map(|pieces| wrong_heights(pieces)));
-    let counts: Vec<u32> = area.grid.all().iter().map(|id| levels[0].get(&id).map_or(0, polygons)).collect();
+    problems.extend(pieces.iter().flat_map(|(thing, pieces)| wrong_heights(*thing, pieces)));
     problems.extend(over_limits(area, spec, &counts));
     let all: u64 = counts.iter().map(|&count| u64::from(count)).sum();
     if let Some(report) = report.filter(|report| report.polygons != all) {
         problems.push(format!("report.json: {} polygons of objects, load modules have {all}", report.polygons));
     }
-    let told = told(&levels[0], &pieces, all);
-    Standing { problems, told }
+    Standing { problems, told: told(&kinds, all) }
 }
 
 /// A prism in one load module.
-struct Piece<'a> {
+struct Piece {
     id: ModuleId,
-    prism: &'a Prism,
+    kind: ObjectKind,
+    base: i32,
+    roof: i32,
     /// The lowest ground under it at any level, and the highest at the finest.
     ground: [i32; 2],
     /// Its base and its roof above the highest ground under all pieces; a base of 0 is on the ground.
@@ -106,27 +116,27 @@ fn edges(ring: &[Corner]) -> impl Iterator<Item = (Corner, Corner)> {
 }
 
 /// What is wrong with the heights of the pieces of one prism.
-fn wrong_heights(pieces: &[Piece]) -> Vec<String> {
+fn wrong_heights(thing: u64, pieces: &[Piece]) -> Vec<String> {
     let highest = pieces.iter().map(|piece| piece.ground[1]).max().unwrap_or(i32::MIN);
     let metres = |quanta: i32| f64::from(quanta) / f64::from(QUANTA_PER_METRE);
     let mut problems = Vec::new();
-    for Piece { id, prism, ground: [low, _], lifted: [base, roof] } in pieces {
+    for Piece { id, kind, base: of_base, roof: of_roof, ground: [low, _], lifted: [base, roof] } in pieces {
         let mut tell = |what: String| {
-            problems.push(format!("load module {id}: {} {:016x}: {what}", prism.kind, prism.id));
+            problems.push(format!("load module {id}: {kind} {thing:016x}: {what}"));
         };
-        let over = prism.roof - roof - highest;
+        let over = of_roof - roof - highest;
         if over < -ROUNDING {
             tell(format!("its roof is {:.2} m too low over the ground", metres(-over)));
         }
-        if prism.roof != pieces[0].prism.roof {
+        if *of_roof != pieces[0].roof {
             tell("its pieces have different roofs".to_owned());
         }
         match *base {
-            0 if low + ROUNDING < prism.base => {
-                tell(format!("it floats {:.2} m above the ground", metres(prism.base - low)));
+            0 if low + ROUNDING < *of_base => {
+                tell(format!("it floats {:.2} m above the ground", metres(of_base - low)));
             }
             0 => {}
-            base if prism.roof - roof != prism.base - base => tell("it hangs at another height".to_owned()),
+            base if of_roof - roof != of_base - base => tell("it hangs at another height".to_owned()),
             _ => {}
         }
     }
@@ -134,7 +144,7 @@ fn wrong_heights(pieces: &[Piece]) -> Vec<String> {
 }
 
 /// The lowest ground of any of these levels at places under a prism, and the highest of the first.
-fn ground_under<'a>(prism: &Prism, levels: impl Iterator<Item = &'a LoadModule>) -> [i32; 2] {
+fn ground_under(prism: &Prism, levels: impl Iterator<Item = Rc<LoadModule>>) -> [i32; 2] {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for (level, module) in levels.enumerate() {
         let mut see = |height: f64| {
@@ -214,14 +224,13 @@ fn over_limits(area: &GamingArea, spec: &ObjectsSpec, counts: &[u32]) -> Vec<Str
     problems
 }
 
-fn told(modules: &Modules, prisms: &BTreeMap<u64, Vec<Piece>>, polygons: u64) -> String {
-    let mut kinds: BTreeMap<_, BTreeSet<u64>> = BTreeMap::new();
-    for pieces in prisms.values() {
-        kinds.entry(pieces[0].prism.kind).or_default().insert(pieces[0].prism.id);
-    }
-    for canopy in modules.values().flat_map(|module| &module.objects.canopies) {
-        kinds.entry(canopy.kind).or_default().insert(canopy.id);
-    }
+/// Kind and number of each object, of which a load module may have several pieces.
+fn things(objects: &Objects) -> impl Iterator<Item = (ObjectKind, u64)> + '_ {
+    let prisms = objects.prisms.iter().map(|prism| (prism.kind, prism.id));
+    prisms.chain(objects.canopies.iter().map(|canopy| (canopy.kind, canopy.id)))
+}
+
+fn told(kinds: &BTreeMap<ObjectKind, BTreeSet<u64>>, polygons: u64) -> String {
     let kinds: Vec<String> = kinds.iter().map(|(kind, ids)| format!("{} {kind}", ids.len())).collect();
     if kinds.is_empty() { "none".to_owned() } else { format!("{}; {polygons} polygons", kinds.join(", ")) }
 }

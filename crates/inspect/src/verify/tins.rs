@@ -4,7 +4,8 @@
 //! cut once more from the points of the TINs around, because that rule alone says which triangles were one polygon:
 //! heights are rounded, so no load module shows which of its pieces lay in one plane.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
+use std::collections::btree_map::{BTreeMap, Entry};
 
 use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use store::{Folder, Manifest, Stamp};
@@ -51,7 +52,6 @@ pub(crate) fn check(
     modules: &Modules,
 ) -> Result<OfTins, CompileError> {
     let mut all = OfTins::default();
-    let mut points: BTreeMap<TileId, Vec<Vertex>> = BTreeMap::new();
     for record in &manifest.tiles {
         let tile = record.tile();
         let (stamp, tin) = match folder.read_tile(tile) {
@@ -83,13 +83,19 @@ pub(crate) fn check(
         }
         if job.modules.edges == Edges::Constrained {
             all.problems.extend(differing_parts(area, tile, &tin, modules));
-        } else {
-            points.insert(tile, tin.tin.vertices.clone());
         }
         all.add(job, area, &tin, stamp, removed);
     }
     if let (Edges::Clip(heights), true) = (job.modules.edges, all.problems.is_empty()) {
+        // Of three rows of tiles at once.
+        let mut points: BTreeMap<TileId, Vec<Vertex>> = BTreeMap::new();
         for &tile in &area.tiles {
+            points.retain(|other, _| tile.row <= other.row + 1);
+            for near in area.tiling.neighbours(tile).into_iter().chain([tile]) {
+                if let Entry::Vacant(of) = points.entry(near) {
+                    of.insert(folder.read_tile(near)?.1.tin.vertices);
+                }
+            }
             let problems = differing_cuts(area, tile, heights, (&points, &all.removed), modules);
             all.problems.extend(problems);
         }
@@ -222,7 +228,7 @@ fn differing_cuts(
     let mask = Importance::uniform(area.tiling.rect(tile), 1);
     let cut = clip(&around, &layout, ClipHeights::Coplanar, &mask);
     let known = cut.iter().filter_map(|expected| Some((modules.get(&expected.id)?, expected)));
-    known.filter_map(|(found, expected)| differing_cut(found, expected, heights)).collect()
+    known.filter_map(|(found, expected)| differing_cut(&found, expected, heights)).collect()
 }
 
 fn differing_cut(found: &LoadModule, expected: &LoadModule, heights: JobClipHeights) -> Option<String> {

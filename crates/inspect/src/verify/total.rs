@@ -14,12 +14,16 @@ pub(crate) struct Total {
 
 impl Total {
     pub fn of(residuals: impl Iterator<Item = ModuleResidual>) -> Self {
-        residuals.fold(Self::default(), |sum, one| Self {
-            posts: sum.posts + u128::from(one.posts),
-            largest: sum.largest.max(one.largest),
-            sum_abs: sum.sum_abs + u128::from(one.sum_abs),
-            sum_squared: sum.sum_squared + u128::from(one.sum_squared),
-        })
+        let mut sum = Self::default();
+        residuals.for_each(|residual| sum.add(residual));
+        sum
+    }
+
+    pub fn add(&mut self, one: ModuleResidual) {
+        self.posts += u128::from(one.posts);
+        self.largest = self.largest.max(one.largest);
+        self.sum_abs += u128::from(one.sum_abs);
+        self.sum_squared += u128::from(one.sum_squared);
     }
 
     pub fn of_tallies(tallies: &[MeasuredTally]) -> Self {

@@ -85,7 +85,7 @@ fn posts_in(
             }
             let id = ModuleId { row: (row / side) as u32, col: (col / side) as u32 };
             let post = Post::new(row as i32, col as i32);
-            heights.extend(modules.get(&id).and_then(|module| height_m(module, post, spacing)));
+            heights.extend(modules.get(&id).and_then(|module| height_m(&module, post, spacing)));
         }
     }
     heights

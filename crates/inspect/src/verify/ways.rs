@@ -54,7 +54,7 @@ impl Ways {
         let mut ways = Self::default();
         let names = job.class_names();
         for module in modules.values().filter(|module| !module.lines.is_empty()) {
-            let ground = Ground::of(module, first_class, aside);
+            let ground = Ground::of(&module, first_class, aside);
             for line in &module.lines {
                 let name = names.get(usize::from(line.class)).map_or("", String::as_str);
                 ways.add(line, family(line.traits.kind, name), &ground);

@@ -252,6 +252,29 @@ fn files_on_disk_in_memory_and_damaged_are_told_apart() {
 }
 
 #[test]
+fn a_file_of_an_area_is_opened_when_a_load_module_of_it_is_asked_for() {
+    let folder = std::env::temp_dir().join(format!("load-module-reader-area-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let (near, far) = (folder.join("near.slm"), folder.join("far.slm"));
+    std::fs::write(&near, sample::file()).unwrap();
+    // The same load modules a row farther north, and an index that cannot be read.
+    let mut bytes = with_header(&[(40, &3u32.to_le_bytes()), (44, &4u32.to_le_bytes())]);
+    let header_length = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
+    bytes[header_length] ^= 1;
+    std::fs::write(&far, bytes).unwrap();
+    let block = Block { south: 2, west: 3, north: 3, east: 5 };
+    let [held, late] = [(); 2].map(|()| Area::open(&folder, Keep::OnDisk).unwrap());
+    let ground = held.load(block).unwrap();
+    assert!(held.load(Block { south: 3, north: 4, ..block }).is_err());
+    // What was opened is held open; what is opened late is the file that the area was made of, or none.
+    std::fs::write(folder.join("new"), with_header(&[(92, &[7; 32])])).unwrap();
+    std::fs::rename(folder.join("new"), &near).unwrap();
+    assert_eq!(held.load(block).unwrap().modules().len(), ground.modules().len());
+    assert!(matches!(late.load(block), Err(ReadError::Changed { .. })));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn a_block_is_loaded_at_any_level_of_the_area() {
     let area = Area::of_files(vec![TileFile::of_bytes("levels", Arc::new(sample::two_levels())).unwrap()]).unwrap();
     assert_eq!(area.frame().level_count, 2);

@@ -20,7 +20,8 @@ Examples:
 
 A point adds two triangles. What one more would buy is the best split of one
 triangle at one post, its height chosen for the least squared residuals; nothing
-else moves.
+else moves. An area of more than 16,384 load modules is not read whole: 1,024 of
+them, drawn evenly, are compared with.
 
 Exit codes: 0 explained; 2 no such load module, or no database to read.";
 
@@ -96,8 +97,11 @@ fn counts(found: &Explanation) -> Table {
     );
     table.row(["window", &grouped(u64::from(window.count)), &around]);
     let [rms_m, mean_m, largest_m] = found.residual_m;
-    let (place, of) = (grouped(found.place.0 as u64), grouped(found.place.1 as u64));
-    let residual = format!("RMS, mean {mean_m:.2} m, largest {largest_m:.2} m; {place} of {of} from the worst");
+    let place = match share_before(found, found.place.0) {
+        Some(share) => format!("{share} have a larger one"),
+        None => format!("{} of {} from the worst", grouped(found.place.0 as u64), grouped(found.place.1 as u64)),
+    };
+    let residual = format!("RMS, mean {mean_m:.2} m, largest {largest_m:.2} m; {place}");
     table.row(["residual", &format!("{rms_m:.3} m"), &residual]);
     let (tile, state, stop) = found.tile;
     let allowed = found.tile_triangles.1.map_or(String::new(), |allowed| format!(" of {} allowed", grouped(allowed)));
@@ -279,20 +283,30 @@ fn refused_text(found: &Explanation) -> String {
     format!("{} posts were refused here\n{}{rest}", found.refused.len(), table.text(2))
 }
 
+/// How many come before a place, as a share of those that were drawn to be compared with, where not all are.
+fn share_before(found: &Explanation, place: usize) -> Option<String> {
+    found.drawn_of?;
+    let of = found.place.1;
+    let share = 100.0 * (place - 1) as f64 / of as f64;
+    Some(format!("of {} load modules drawn evenly, {share:.0} %", grouped(of as u64)))
+}
+
 fn one_more_text(found: &Explanation) -> String {
     match (&found.one_more, &found.no_ground) {
         (Some(more), _) => {
             let [east, north] = more.place_m;
             let [rms_m, ..] = found.residual_m;
+            let (larger, of) = (grouped(more.place as u64 - 1), grouped(found.place.1 as u64));
+            let before = share_before(found, more.place).unwrap_or_else(|| format!("{larger} of {of} load modules"));
             format!(
                 "One more point, two triangles, would take the RMS residual from {rms_m:.3} m to {:.3} m:\n  at {east} \
                  {north}, {:.2} m {} the triangle there; half of that a triangle.\n  \
-                 {} of {} load modules would gain more.\n",
+                 {}{} would gain more.\n",
                 more.rms_after_m,
                 more.raised_m.abs(),
                 if more.raised_m < 0.0 { "below" } else { "above" },
-                grouped(more.place as u64 - 1),
-                grouped(found.place.1 as u64)
+                before[..1].to_uppercase(),
+                &before[1..],
             )
         }
         (None, Some(why)) => format!(
@@ -342,7 +356,7 @@ pub fn to_json(found: &Explanation) -> Value {
     let [rms_m, mean_abs_m, max_m] = found.residual_m;
     let window = found.window;
     let classes = found.classes.iter().map(|(name, count)| json!({ "name": name, "triangles": count }));
-    json!({
+    let mut value = json!({
         "module": [found.module.row, found.module.col],
         "extent_m": found.extent_m,
         "tile": {
@@ -392,5 +406,9 @@ pub fn to_json(found: &Explanation) -> Value {
         "no_ground": found.no_ground,
         "features": found.features.as_ref().map(features_json),
         "objects": found.objects.as_ref().map(objects_json),
-    })
+    });
+    if let Some(all) = found.drawn_of {
+        value["residual"]["drawn_of"] = json!(all);
+    }
+    value
 }

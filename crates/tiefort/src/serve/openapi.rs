@@ -337,7 +337,7 @@ fn obstacle() -> Value {
 fn explain() -> Value {
     let mut operation = get(
         "One load module, explained",
-        "What it holds, what limits refused there. It reads the whole database: one is answered at a time.",
+        "What it holds, what limits refused there. It reads all load modules, or of more than 16,384 some: one at a time.",
         &["database"],
         &[("application/json", "as `tiefort explain --format json` prints it")],
     );

@@ -21,6 +21,7 @@ mod help;
 mod hints;
 #[cfg(feature = "viewer")]
 mod imagery;
+mod large_area;
 mod measures;
 mod meshes;
 mod odd_files;

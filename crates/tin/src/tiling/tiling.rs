@@ -21,7 +21,8 @@ impl Tiling {
             let steps = cells / step as usize;
             assert!(cells.is_multiple_of(step as usize), "tile lines lie on whole steps");
             assert!(0 < tiles && tiles as usize <= steps, "{tiles} tiles need at least as many steps, found {steps}");
-            (0..=tiles as usize).map(|k| first + (k * steps).div_ceil(tiles as usize) as i32 * step).collect()
+            let line = |row| ModuleRect::of_tile(TileId { row, col: 0 }, [steps as u32; 2], [tiles; 2]).south;
+            (0..=tiles).map(|k| first + line(k) as i32 * step).collect()
         };
         Self {
             row_lines: lines(area.south, area.cells_high(), rows),
