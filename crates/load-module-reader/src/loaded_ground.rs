@@ -226,6 +226,7 @@ impl LoadedGround {
         if self.is_below(from_m) {
             return Sight::Hidden(0.0);
         }
+        let is_end_below = self.is_below(to_m);
         let (from, to) = (self.quanta(from_m), self.quanta(to_m));
         let side = f64::from(self.frame.side);
         let (mut nearest, mut left_at) = (f64::INFINITY, f64::INFINITY);
@@ -234,7 +235,11 @@ impl LoadedGround {
             let inside = |index: i64| u32::try_from(index).ok();
             let loaded = inside(row).zip(inside(col)).and_then(|(row, col)| self.module(row, col));
             match loaded {
-                Some(module) => nearest = nearest_in(module, &Line::in_module(corner, from, to, curvature)),
+                Some(module) => {
+                    let mut line = Line::in_module(corner, from, to, curvature);
+                    line.is_end_below = is_end_below;
+                    nearest = nearest_in(module, &line);
+                }
                 None => left_at = entered_at(corner, side, from, to),
             }
             // What comes later lies further along the line; what is not loaded ends the walk whatever rounding says.
@@ -245,7 +250,7 @@ impl LoadedGround {
         match (nearest <= left_at && nearest.is_finite(), left_at.is_finite()) {
             (true, _) => Sight::Hidden(nearest),
             (false, true) => Sight::Unknown,
-            (false, false) if self.is_below(to_m) => Sight::Hidden(1.0),
+            (false, false) if is_end_below => Sight::Hidden(1.0),
             (false, false) => Sight::Free,
         }
     }

@@ -14,6 +14,8 @@ pub(crate) struct Line {
     heights: [f64; 2],
     /// Four times as much as its middle hangs below the straight line, for the curvature of the earth.
     sag: f64,
+    /// Whether its end is known to lie below the ground.
+    pub(crate) is_end_below: bool,
 }
 
 impl Line {
@@ -24,7 +26,7 @@ impl Line {
         let along = [end[0] - start[0], end[1] - start[1]];
         let length_squared = along[0] * along[0] + along[1] * along[1];
         let sag = curvature.per_metre() * length_squared / f64::from(QUANTA_PER_METRE);
-        Self { start, end, along, length_squared, heights: [from[2], to[2]], sag }
+        Self { start, end, along, length_squared, heights: [from[2], to[2]], sag, is_end_below: false }
     }
 
     /// How far left of the line a place lies, and how far ahead, both times the length.
@@ -60,6 +62,16 @@ impl Line {
     pub(crate) fn lowest(&self, [first, last]: [f64; 2]) -> f64 {
         let bow = last - first;
         self.height(first).min(self.height(last)) - self.sag * bow * bow / 4.0
+    }
+
+    /// Where the line goes below straight ground between two shares of it, by how far it is above the ground at both.
+    fn enters(&self, [first, above_first]: [f64; 2], [last, above_last]: [f64; 2]) -> f64 {
+        // How far above, over the part from 0 to 1: above_first + fall * part + bow * part^2, the smaller root.
+        let bow = self.sag * (last - first) * (last - first);
+        let fall = above_last - above_first - bow;
+        let root = (fall * fall - 4.0 * bow * above_first).max(0.0).sqrt();
+        let part = if above_first <= 0.0 { 0.0 } else { 2.0 * above_first / (root - fall) };
+        (first + part.min(1.0) * (last - first)).clamp(0.0, 1.0)
     }
 
     /// Where the straight ground between two of its edges rises highest above a line that sags, and by how much; the
@@ -109,12 +121,12 @@ pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
 
 /// Where along a line one triangle first rises above it; infinity where it does not.
 pub(crate) fn risen_at(corners: &Corners, line: &Line) -> f64 {
-    let mut nearest = f64::INFINITY;
     let seen = corners.map(|corner| line.seen(corner.map(f64::from)));
     if seen.iter().all(|&(left, _)| 0.0 < left) || seen.iter().all(|&(left, _)| left < 0.0) {
-        return nearest;
+        return f64::INFINITY;
     }
-    // Between two edges the ground is straight, so it is enough to look where an edge is crossed.
+    // Between two edges the ground is straight, so that it rises above the line is seen where an edge is crossed.
+    let (mut is_hidden, mut first, mut last) = (false, [f64::INFINITY, 0.0], [f64::NEG_INFINITY, 0.0]);
     for i in 0..3 {
         let ((left_a, ahead_a), (left_b, ahead_b)) = (seen[i], seen[(i + 1) % 3]);
         if (0.0 < left_a) == (0.0 < left_b) && (left_a < 0.0) == (left_b < 0.0) || left_a == left_b {
@@ -123,17 +135,14 @@ pub(crate) fn risen_at(corners: &Corners, line: &Line) -> f64 {
         let [height_a, height_b] = [corners[i], corners[(i + 1) % 3]].map(|corner| f64::from(corner[2]));
         let share = left_a / (left_a - left_b);
         let at = (ahead_a + share * (ahead_b - ahead_a)) / line.length_squared;
-        let height = height_a + share * (height_b - height_a);
-        if (0.0..=1.0).contains(&at) && line.height(at) < height {
-            nearest = nearest.min(at);
-        }
+        let above = line.height(at) - (height_a + share * (height_b - height_a));
+        is_hidden |= (0.0..=1.0).contains(&at) && above < 0.0;
+        first = if at < first[0] { [at, above] } else { first };
+        last = if last[0] < at { [at, above] } else { last };
     }
-    if let Some([at, above]) = line.highest_between(corners)
-        && 0.0 < above
-    {
-        nearest = nearest.min(at - (above / line.sag).sqrt());
-    }
-    nearest
+    let is_risen_between = || line.highest_between(corners).is_some_and(|[_, above]| 0.0 < above);
+    let is_end_in = || line.is_end_below && first[0] <= 1.0 && 1.0 <= last[0];
+    if is_hidden || is_end_in() || is_risen_between() { line.enters(first, last) } else { f64::INFINITY }
 }
 
 /// The least height in quanta of a line above the triangles of the ground, where it crosses their edges; infinity where

@@ -145,25 +145,32 @@ fn a_line_of_sight_ends_at_the_first_ground_above_it() {
     assert_eq!(ground.sight(above(10.0, 5.0), above(490.0, 5.0)), Sight::Free, "what only touches hides nothing");
     // From the pit one does not see over its rim.
     let Sight::Hidden(share) = ground.sight(above(734.375, 1.0), above(100.0, 5.5)) else { panic!("the rim hides") };
-    assert!((0.3..0.4).contains(&share), "{share}");
+    let entered = above(734.375 - share * 634.375, 1.0 + share * 4.5);
+    assert!((ground.height_m([entered[0], entered[1]]).unwrap() - entered[2]).abs() < 1e-6, "{share}");
     assert_eq!(ground.sight(above(10.0, 6.0), above(-400.0, 6.0)), Sight::Unknown);
-    assert_eq!(ground.sight(above(734.375, 1.0), above(-100.0, 1.0)), Sight::Hidden(share_of_rim()));
+    let Sight::Hidden(share) = ground.sight(above(734.375, 1.0), above(-100.0, 1.0)) else { panic!("the slope hides") };
+    assert!((share - share_of_slope()).abs() < 1e-9, "{share}");
 }
 
-/// Along the level line 1 m up from the bottom, westwards, the slope reaches it where it has risen by 135/128 m; the
-/// first edge beyond is the side of the load module, at the rim.
-fn share_of_rim() -> f64 {
-    234.375 / 834.375
+/// Along the level line 1 m up from the bottom, westwards, the slope reaches it where it has risen by 135/128 m, of the
+/// 647/128 m up to the rim.
+fn share_of_slope() -> f64 {
+    234.375 * 135.0 / 647.0 / 834.375
 }
 
 /// Holds a line of sight to how far it stays above the ground `at` each share of it; whether it is free.
 fn agrees_with_small_steps(found: Sight, clearance_m: f64, at: impl Fn(f64) -> f64) -> bool {
-    let least = (0..=2000).map(|step| at(f64::from(step) / 2000.0)).fold(f64::INFINITY, f64::min);
+    let steps = || (0..=2000).map(|step| f64::from(step) / 2000.0);
+    let least = steps().map(&at).fold(f64::INFINITY, f64::min);
     assert!(clearance_m <= least + 1e-4 && least <= clearance_m + 3.0, "{clearance_m} of {least}");
     match found {
         Sight::Free => assert!(-0.5 < least && -1e-5 <= clearance_m, "{least}, {clearance_m}"),
         Sight::Hidden(share) => {
-            assert!(at(share) < 1e-6 && clearance_m < 1e-5, "{} at {share}, {clearance_m}", at(share));
+            // It is above the ground up to there, on it there, or below it from its beginning.
+            let is_entered =
+                at(share).abs() < 1e-4 && steps().filter(|&step| step < share).all(|step| -1e-4 < at(step));
+            assert!(is_entered || share == 0.0 && at(0.0) < 0.0, "{} at {share}", at(share));
+            assert!(clearance_m < 1e-5, "{clearance_m}");
         }
         Sight::Unknown => panic!("all of it is loaded"),
     }

@@ -171,9 +171,8 @@ fn lines_past_objects_agree_with_small_steps() {
         let length_m = [0, 1, 2].map(|axis| to[axis] - from[axis]).iter().map(|run| run * run).sum::<f64>().sqrt();
         match (found.sight, expected) {
             (Sight::Hidden(at), Some((share, by))) => {
-                // A corner may be grazed between two steps; the ground hides from the next edge on.
-                let late = if found.by == Some(Hider::Ground) { 1.0 } else { 1e-3 };
-                assert!(at <= share + late, "{from:?} {to:?}: {found:?}, expected {expected:?}");
+                // A corner may be grazed between two steps.
+                assert!(at <= share + 1e-3, "{from:?} {to:?}: {found:?}, expected {expected:?}");
                 counts[usize::from(by == Hider::Building)] += 1;
                 if (share - at).abs() < 1e-3 {
                     assert_eq!(found.by, Some(by));
