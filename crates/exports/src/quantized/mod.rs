@@ -10,6 +10,7 @@ mod collar;
 mod extensions;
 mod holes;
 mod lattice;
+mod slivers;
 mod tile;
 
 use std::borrow::Borrow;
@@ -26,6 +27,7 @@ use collar::{GlobeMesh, with_collar};
 use extensions::{CELLS, WaterMask};
 use holes::holes;
 use lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
+use slivers::{GONE, right, weld};
 pub(crate) use tile::Tile;
 
 /// Load modules along a tile of the finest level, about.
@@ -186,7 +188,8 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
                 water.add(corners, [col * STEPS, row * STEPS]);
             }
         }
-        assert!(0.999 < tile.covered(), "ground goes on over all of tile {}/{col}/{row}", self.level);
+        tile.close();
+        assert_eq!(tile.covered(), 1.0, "ground goes on over all of tile {}/{col}/{row}", self.level);
         tile.water = self.has_water().then_some(water);
         tile
     }
@@ -227,8 +230,11 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
         };
         self.nodes = (0..sheet.lon_lat.len()).map(node).collect();
         self.triangles = sheet.triangles;
+        // Before tiles are cut: so they agree on what lies along the lines between them.
+        weld(&self.nodes, &mut self.triangles);
+        right(&self.nodes, &mut self.triangles);
         let (cols, rows) = self.bounds.tiles(self.level, self.level);
-        for (index, triangle) in (0..).zip(&self.triangles) {
+        for (index, triangle) in (0..).zip(&self.triangles).filter(|(_, triangle)| **triangle != GONE) {
             let triangle = triangle.map(|v| self.nodes[v as usize]);
             let range = |of: fn(&Node) -> i64, [first, last]: [i64; 2]| {
                 let values = || triangle.iter().map(of);

@@ -144,7 +144,7 @@ fn check_tiles(files: &BTreeMap<String, Vec<u8>>) {
                 (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
             })
             .sum();
-        assert!((area as f64 / (2 * STEPS * STEPS) as f64 - 1.0).abs() < 1e-3, "{level}/{col}/{row}");
+        assert_eq!(area, 2 * STEPS * STEPS, "{level}/{col}/{row}");
         assert!(tile.vertices.iter().flatten().all(|part| (0..=STEPS).contains(part)));
         // The header has the tile's own lowest and highest height.
         let heights = || tile.vertices.iter().map(|vertex| vertex[2]);

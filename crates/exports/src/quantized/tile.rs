@@ -7,6 +7,7 @@ use serde_json::Value;
 use super::clip::doubled_area;
 use super::extensions::{WaterMask, put_metadata};
 use super::lattice::{Ladder, Node, STEPS, height_m, lon_lat};
+use super::slivers::{GONE, right};
 use crate::earth::earth_centred;
 use crate::mesh::{cross, dot, minus, unit};
 
@@ -38,7 +39,7 @@ impl Tile {
         Self { level, col, row, nodes, place_of, lowest, triangles, water: None, metadata: None }
     }
 
-    /// Adds a convex polygon as a fan; what is thinner than the lattice is left out.
+    /// Adds a convex polygon as a fan, without triangles two corners of which fall on one place.
     pub(crate) fn add(&mut self, polygon: &[Node]) {
         for node in polygon {
             let lowest = self.lowest.entry((node.x, node.y)).or_insert(*node);
@@ -48,11 +49,49 @@ impl Tile {
         }
         for i in 1..polygon.len().saturating_sub(1) {
             let corners = [polygon[0], polygon[i], polygon[i + 1]];
-            if 0 < doubled_area(&corners[0], &corners[1], &corners[2]) {
+            let [a, b, c] = corners.map(|node| (node.x, node.y));
+            if a != b && b != c && c != a {
                 let triangle = corners.map(|node| self.place(node));
                 self.triangles.push(triangle);
             }
         }
+    }
+
+    /// Makes one surface of what was added: triangles are counter-clockwise, and no edge inside of the tile is torn.
+    pub(crate) fn close(&mut self) {
+        let mut triangles = std::mem::take(&mut self.triangles);
+        right(&self.nodes, &mut triangles);
+        self.place_of.clear();
+        let nodes = std::mem::take(&mut self.nodes);
+        for triangle in triangles.into_iter().filter(|triangle| *triangle != GONE) {
+            let triangle = triangle.map(|v| self.place(nodes[v as usize]));
+            self.triangles.push(triangle);
+        }
+        assert_eq!(self.torn(), 0, "every edge inside of tile {}/{}/{} has two sides", self.level, self.col, self.row);
+    }
+
+    /// Edges that have a triangle on one side alone, but for those along the tile's border.
+    pub(crate) fn torn(&self) -> usize {
+        let mut sides: HashMap<(u32, u32), i32> = HashMap::new();
+        for &[a, b, c] in &self.triangles {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                *sides.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
+            }
+        }
+        sides.into_iter().filter(|&((a, b), sides)| sides != 0 && !self.is_on_border(a, b)).count()
+    }
+
+    /// Whether an edge lies on one of the tile's four sides.
+    fn is_on_border(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|v| self.nodes[v as usize]);
+        let is_end = |at: i64, tile: i64| at == tile * STEPS || at == (tile + 1) * STEPS;
+        a.x == b.x && is_end(a.x, self.col) || a.y == b.y && is_end(a.y, self.row)
+    }
+
+    /// Doubled areas of its triangles, in steps.
+    pub(crate) fn areas(&self) -> impl Iterator<Item = i64> {
+        let node = |v: u32| &self.nodes[v as usize];
+        self.triangles.iter().map(move |&[a, b, c]| doubled_area(node(a), node(b), node(c)))
     }
 
     /// The vertex at a node's place: numbered when it is first used, as the format wants it.
@@ -67,10 +106,7 @@ impl Tile {
 
     /// Share of the tile that its triangles cover.
     pub(crate) fn covered(&self) -> f64 {
-        let area = |&[a, b, c]: &[u32; 3]| {
-            doubled_area(&self.nodes[a as usize], &self.nodes[b as usize], &self.nodes[c as usize])
-        };
-        self.triangles.iter().map(area).sum::<i64>() as f64 / (2 * STEPS * STEPS) as f64
+        self.areas().sum::<i64>() as f64 / (2 * STEPS * STEPS) as f64
     }
 
     /// Where it lies on the globe.
