@@ -10,8 +10,9 @@ use std::fmt::Write as _;
 use terrain::{ModuleId, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::boxes::{UprightBox, boxes};
+use crate::earth::{directions, earth_centred};
 use crate::gpkg_styles::escaped;
-use crate::mesh::{Part, class_groups};
+use crate::mesh::{Part, class_groups, dot, minus};
 use crate::modules::group_name;
 use crate::polygon_files::{put_obj_faces, put_obj_places, put_obj_vertices};
 use crate::sheets::Material;
@@ -129,8 +130,10 @@ fn corner(product: &Product, rect: ModuleRect) -> [i32; 2] {
 
 fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, ExportError> {
     let place_m = product.corner_m(product.rect.south, product.rect.west);
-    // Longitudes and latitudes only.
-    let [longitude, latitude] = Earth::new(product, Some(Datum::Ellipsoid))?.lon_lat(place_m)?;
+    let datum = Datum::named(product.vertical_datum()).unwrap_or(Datum::Ellipsoid);
+    let earth = Earth::new(product, Some(datum))?;
+    let [longitude, latitude] = earth.lon_lat(place_m)?;
+    let (elevation, heading) = (earth.datum_m([longitude, latitude]), heading_deg(product, &earth)?);
     let name = escaped(&product.manifest.area.name);
     let mut text = format!(
         "<?xml version=\"1.0\"?>\n<!-- tiefort: x east, y north of {} {} in {}, z up above {}; metres{} -->\n\
@@ -156,7 +159,7 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
         "    <spherical_coordinates>\n      <surface_model>EARTH_WGS84</surface_model>\n      \
          <world_frame_orientation>ENU</world_frame_orientation>\n      \
          <latitude_deg>{latitude:.9}</latitude_deg>\n      <longitude_deg>{longitude:.9}</longitude_deg>\n      \
-         <elevation>0</elevation>\n      <heading_deg>0</heading_deg>\n    </spherical_coordinates>\n    \
+         <elevation>{elevation:.3}</elevation>\n      <heading_deg>{heading:.9}</heading_deg>\n    </spherical_coordinates>\n    \
          <light type=\"directional\" name=\"sun\">\n      <cast_shadows>true</cast_shadows>\n      \
          <diffuse>0.9 0.9 0.85 1</diffuse>\n      <direction>0.5 -0.4 -0.8</direction>\n    </light>\n"
     );
@@ -175,6 +178,17 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
     }
     text.push_str("    </plugin>\n  </world>\n</sdf>\n");
     Ok(text)
+}
+
+/// By how many degrees the world's y lies left of true north, seen from the world's origin to the corner across.
+fn heading_deg(product: &Product, earth: &Earth) -> Result<f64, ExportError> {
+    let rect = product.rect;
+    let ends_m = [product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east)];
+    let [from, to] = [earth.lon_lat(ends_m[0])?, earth.lon_lat(ends_m[1])?];
+    let along = minus(earth_centred(to, 0.0), earth_centred(from, 0.0));
+    let [east, north, _] = directions(from).map(|axis| dot(axis, along));
+    let [x, y] = [0, 1].map(|axis| ends_m[1][axis] - ends_m[0][axis]);
+    Ok((x * north - y * east).atan2(x * east + y * north).to_degrees())
 }
 
 /// Whom to thank for the sources, as part of a comment, which must not end there.
@@ -284,5 +298,34 @@ mod tests {
         assert_eq!((count("f "), count("o ")), (6 + decks, 2), "{mesh}");
         let corners = mesh.lines().filter_map(|line| line.strip_prefix("f ")).flat_map(str::split_whitespace);
         assert!(corners.map(|text| text.parse::<usize>().unwrap()).all(|corner| (1..=count("v ")).contains(&corner)));
+    }
+
+    #[test]
+    fn a_place_of_the_world_lies_on_the_globe_where_the_area_has_it() {
+        // 1.5 degrees east of the meridian of its zone, where the grid is turned by 0.86 degrees.
+        let mut product = samples::product();
+        product.frame.origin_east_m = 636_000.0;
+        product.manifest.area.vertical_datum = "EGM96".into();
+        let files = samples::texts(|put, work| write_gazebo(&product, put, work));
+        let number = |name: &str| -> f64 {
+            let rest = files["area.sdf"].split_once(&format!("<{name}>")).unwrap().1;
+            rest.split_once('<').unwrap().0.parse().unwrap()
+        };
+        let earth = Earth::new(&product, None).unwrap();
+        let origin_m = product.corner_m(product.rect.south, product.rect.west);
+        let origin = [number("longitude_deg"), number("latitude_deg")];
+        assert!((number("elevation") - earth.datum_m(origin)).abs() < 1e-3 && number("elevation") < -10.0);
+        assert!((0.8..0.9).contains(&-number("heading_deg")), "{}", number("heading_deg"));
+        let (sin, cos) = number("heading_deg").to_radians().sin_cos();
+        for [x, y] in [[1000.0, 500.0], [1000.0, 0.0], [0.0, 500.0]] {
+            // As Gazebo turns a place of the world to east and north.
+            let [east, north] = [x * cos - y * sin, x * sin + y * cos];
+            let place = earth.lon_lat([origin_m[0] + x, origin_m[1] + y]).unwrap();
+            let expected = minus(earth_centred(place, 0.0), earth_centred(origin, 0.0));
+            let [axis_east, axis_north, _] = directions(origin);
+            // What is left is the scale of the map there.
+            let off = (dot(axis_east, expected) - east).hypot(dot(axis_north, expected) - north);
+            assert!(off < 0.5e-3 * x.hypot(y), "{off} m at {x} {y}");
+        }
     }
 }
