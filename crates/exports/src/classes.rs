@@ -3,7 +3,7 @@
 use store::Report;
 use terrain::{MaterialName, named_class_color};
 
-/// Base colours of classes whose names say nothing of their colour, in order and over again: told apart by the
+/// Base colours, as screens show them, of classes whose names say nothing of their colour, in order and over again: told apart by the
 /// colour-blind, too.
 const COLOURS: [[f64; 3]; 8] = [
     [0.55, 0.50, 0.36],
@@ -57,8 +57,7 @@ impl<'a> Classes<'a> {
 
     /// Red, green and blue from 0 to 1, as light adds up.
     pub(crate) fn light(self, class: u8) -> [f64; 3] {
-        let named = self.names.get(usize::from(class)).and_then(|name| named_class_color(name));
-        named.map_or(COLOURS[usize::from(class) % COLOURS.len()], |color| color.map(linear))
+        self.color(class).map(linear)
     }
 }
 
@@ -109,7 +108,7 @@ mod tests {
         let classes = Classes::new(&names, &[]);
         assert_eq!(classes.color(2), named_class_color("motorway").unwrap());
         assert_eq!((classes.color(0), classes.color(9)), ([140, 128, 92], [87, 107, 77]));
-        assert_eq!([classes.light(0), classes.light(3)], [[0.55, 0.50, 0.36], [0.117, 0.323, 0.552]]);
+        assert_eq!([classes.light(0), classes.light(3)], [[0.262, 0.216, 0.107], [0.117, 0.323, 0.552]]);
         assert_eq!([1, 3, 9].map(|class| classes.word(class)), ["a_b_c", "lake", "class_9"]);
     }
 
