@@ -256,8 +256,10 @@ impl Layers<'_> {
 
     fn add_tiles(&self, product: &Product) -> rusqlite::Result<()> {
         let mut add = self.0.begin(&TILES, extent(product, product.grid.all()))?;
+        let is_exported = |modules: &ModuleRect| product.rect.iter().any(|module| modules.contains(module));
         let Manifest { tiles, area, .. } = &product.manifest;
-        for (record, modules) in tiles.iter().filter_map(|record| Some((record, area.modules_of(record.tile())?))) {
+        for record in tiles {
+            let Some(modules) = area.modules_of(record.tile()).filter(is_exported) else { continue };
             let state = serde_json::json!(record.state).as_str().map(str::to_owned);
             add.execute(params![self.rectangle(extent(product, modules)), record.row, record.col, state])?;
         }

@@ -17,7 +17,8 @@ const BUILDINGS: Layer = Layer {
     name: "buildings",
     description: "buildings by their rooflines, heights above the vertical datum",
     columns: &[
-        ("id", "INTEGER"),
+        // Text, as in other formats: a number of 64 bits may be larger than SQLite has.
+        ("id", "TEXT"),
         ("class", "TEXT"),
         ("base_m", "DOUBLE"),
         ("roof_m", "DOUBLE"),
@@ -75,7 +76,7 @@ pub(crate) fn add_objects(
             };
             add.execute(params![
                 geometry,
-                id.cast_signed(),
+                id.to_string(),
                 kind.name(),
                 whole.base.map(metres_of_quanta),
                 whole.roof.map(metres_of_quanta),
