@@ -78,8 +78,8 @@ mod tests {
     use crate::quantized::clip::piece;
     use crate::quantized::lattice::STEPS;
 
-    /// Triangles over two by two tiles and those around them, with edges along the lines between these, and many thinner
-    /// than the lattice.
+    /// Triangles over two by two tiles and those around them, with edges along the lines between these, and many
+    /// thinner than the lattice.
     fn slivers(draw: &mut Rng) -> (Vec<Node>, Vec<[u32; 3]>) {
         let square = |at: u32| [at % 5, at / 5].map(|index| (f64::from(index) - 1.0) * STEPS as f64);
         let mut places: Vec<[f64; 2]> = (0..25).map(square).collect();
