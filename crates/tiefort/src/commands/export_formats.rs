@@ -54,7 +54,7 @@ pub(super) enum Layer {
 
 /// Whose heightmaps.
 pub(super) const ENGINES: [(&str, Engine, &str); 2] = [
-    ("unreal", Engine::Unreal, "Sides of 505, 1009, 2017, 4033 or 8129, as PNG"),
+    ("unreal", Engine::Unreal, "Sides of 127, 253, 505, 1009, 2017, 4033, 8129, as PNG"),
     ("unity", Engine::Unity, "Sides of 2^n + 1, as RAW"),
 ];
 
