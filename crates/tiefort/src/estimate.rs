@@ -7,8 +7,8 @@ use terrain::TileId;
 
 /// Seconds of measuring that a forecast is worth: machines differ, and the first tiles may be the quick ones.
 const TRUST_S: f64 = 1.0;
-/// Tiles, the last ones, that tell how many of the next are kept: a build that goes on keeps those at its beginning.
-const RECENT: usize = 32;
+/// Tiles, about the last ones, that tell how many of the next are kept: a build that goes on keeps those at its beginning.
+const RECENT: usize = 8;
 
 /// Listens to a run and says what is left of it.
 #[derive(Debug)]
@@ -25,8 +25,10 @@ pub struct Estimate {
     share: f64,
     /// The same of the last tiles of the current stage.
     recent: f64,
-    /// When each tile at work was begun.
-    begun: BTreeMap<TileId, f64>,
+    /// Of each tile at work, its part of the seconds that went by since it was begun: all that are at work share them.
+    at_work: BTreeMap<TileId, f64>,
+    /// When a tile was heard of last.
+    heard_s: f64,
     /// Seconds that went by while tiles were kept: they tell nothing of those that are worked on.
     kept_s: f64,
     /// Forecast seconds of what was worked on.
@@ -54,8 +56,9 @@ impl Estimate {
     }
 
     fn new(stages: Vec<(Stage, f64)>) -> Self {
-        let (begun, tiles) = (BTreeMap::new(), (0, 0, 0));
-        Self { stages, pace: None, begun_s: None, tiles, share: 1.0, recent: 1.0, begun, kept_s: 0.0, worked_s: 0.0 }
+        let (at_work, tiles) = (BTreeMap::new(), (0, 0, 0));
+        let (share, recent, heard_s, kept_s, worked_s) = (1.0, 1.0, 0.0, 0.0, 0.0);
+        Self { stages, pace: None, begun_s: None, tiles, share, recent, at_work, heard_s, kept_s, worked_s }
     }
 
     /// Takes note of what happened, so many seconds after the start.
@@ -71,17 +74,20 @@ impl Estimate {
                     self.stages.drain(..at);
                 }
             }
-            Event::Started(_, tile) => drop(self.begun.insert(*tile, at_s)),
+            Event::Started(_, tile) => {
+                self.pass_time(at_s);
+                self.at_work.insert(*tile, 0.0);
+            }
             Event::Done(stage, tile) => {
-                self.begun.remove(tile);
+                self.pass_time(at_s);
+                self.at_work.remove(tile);
                 self.tiles.1 += 1;
                 self.pass_tile(1.0);
                 self.worked_s += self.seconds(*stage).unwrap_or(0.0) / self.tiles.0.max(1) as f64;
             }
             Event::Kept(_, tile) => {
-                // Of the time of several tiles at once each has its part.
-                let at_once = self.begun.len().max(1) as f64;
-                self.kept_s += self.begun.remove(tile).map_or(0.0, |begun_s| at_s - begun_s) / at_once;
+                self.pass_time(at_s);
+                self.kept_s += self.at_work.remove(tile).unwrap_or(0.0);
                 self.tiles.2 += 1;
                 self.pass_tile(0.0);
             }
@@ -97,6 +103,12 @@ impl Estimate {
             }
             Event::Because(..) | Event::Note(_) => {}
         }
+    }
+
+    fn pass_time(&mut self, at_s: f64) {
+        let part_s = (at_s - self.heard_s) / self.at_work.len().max(1) as f64;
+        self.at_work.values_mut().for_each(|seconds| *seconds += part_s);
+        self.heard_s = at_s;
     }
 
     fn pass_tile(&mut self, worked: f64) {
