@@ -15,6 +15,8 @@ pub struct ExplainedFeatures {
     pub share: f64,
     /// The most that features may take of it.
     pub share_max: f64,
+    /// The most that they may take of it where one goes in that is no motorway, primary road, rail, river or large lake.
+    pub share_others: f64,
     /// Cubic metres cut and filled in it, by class.
     pub moved_m3: Vec<(String, [f64; 2])>,
     /// Features that lie more than 3 m off the ground in it, each at its worst place, the farthest first.
@@ -43,6 +45,7 @@ pub(crate) fn explained_features(product: &Product, id: ModuleId, extent_m: [f64
         cost,
         share: f64::from(total) / f64::from(product.job.limits.per_load_module.max(1)),
         share_max: spec.share_main.max(spec.share_max),
+        share_others: spec.share_max,
         moved_m3: level
             .moved
             .iter()

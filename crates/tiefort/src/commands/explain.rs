@@ -135,9 +135,11 @@ fn features_text(features: &ExplainedFeatures) -> String {
     let mut text = match features.cost.iter().map(|(_, triangles)| triangles).sum::<u32>() {
         0 => "No roads or water.\n".to_owned(),
         all => format!(
-            "Roads and water take {all} triangles, {} of the limit; they may take {}:\n",
+            "Roads and water take {all} triangles, {} of the limit; they may take {}, and {} where others than main \
+             roads, rails, rivers and lakes go in:\n",
             percent(features.share),
-            percent(features.share_max)
+            percent(features.share_max),
+            percent(features.share_others)
         ),
     };
     let mut table = Table::new(&[Align::Left, Align::Right, Align::Left]);
