@@ -7,7 +7,8 @@ use terrain::TileId;
 
 /// Seconds of measuring that a forecast is worth: machines differ, and the first tiles may be the quick ones.
 const TRUST_S: f64 = 1.0;
-/// Tiles, about the last ones, that tell how many of the next are kept: a build that goes on keeps those at its beginning.
+/// Tiles, about the last ones, that tell how many of the next are kept: a build that goes on keeps those at its
+/// beginning.
 const RECENT: usize = 8;
 
 /// Listens to a run and says what is left of it.

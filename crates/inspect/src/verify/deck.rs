@@ -6,7 +6,7 @@ use fidelity::DeckFigures;
 use terrain::{FeatureSurface, LatticePoint, ModuleVertex, QUANTA_PER_METRE};
 
 use super::square::{At, Square, is_on, turn};
-use super::walk::LevelSums;
+use super::total::LevelSums;
 
 /// Quanta that rounding may put a deck above the ground onto which it was raised: 5 cm.
 const ROUNDING: f64 = 6.4;

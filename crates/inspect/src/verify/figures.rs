@@ -11,8 +11,7 @@ use terrain::{LoadModule, ModuleCounts, ModuleResidual, StopReason, metres_of_qu
 use super::exceeded::Exceeded;
 use super::modules::Modules;
 use super::tins::OfTins;
-use super::total::{Total, squares};
-use super::walk::LevelSums;
+use super::total::{LevelSums, Total, squares};
 use crate::recount;
 use build::ground::GamingArea;
 use build::{Adding, Sums, limit_of, residual_of, sums_of};

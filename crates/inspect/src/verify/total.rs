@@ -1,7 +1,8 @@
 //! Residuals of many load modules together, in 128 bits.
 
+use fidelity::DeckFigures;
 use store::MeasuredTally;
-use terrain::{ModuleResidual, QUANTA_PER_METRE};
+use terrain::{LoadModule, ModuleGrid, ModuleResidual, QUANTA_PER_METRE};
 
 /// Residuals of many load modules together. Nothing that a file can hold makes them wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,6 +46,32 @@ impl Total {
 
     fn per_post(&self, sum: u128) -> f64 {
         if self.posts == 0 { 0.0 } else { sum as f64 / self.posts as f64 }
+    }
+}
+
+/// What the load modules of a level add up to.
+#[derive(Default)]
+pub(crate) struct LevelSums {
+    pub modules: usize,
+    pub triangles: u64,
+    pub polygons: u64,
+    pub residual: Total,
+    /// The same of those at the border of the area, and of the others.
+    pub at_border: Total,
+    pub inside: Total,
+    pub decks: DeckFigures,
+}
+
+impl LevelSums {
+    /// Adds a load module of an area, but for its decks.
+    pub fn add(&mut self, grid: ModuleGrid, module: &LoadModule) {
+        let (id, counts) = (module.id, module.counts());
+        let is_outer = id.row == 0 || id.col == 0 || id.row + 1 == grid.rows || id.col + 1 == grid.cols;
+        self.modules += 1;
+        self.triangles += u64::from(counts.triangles);
+        self.polygons += u64::from(counts.polygons);
+        let part = if is_outer { &mut self.at_border } else { &mut self.inside };
+        [part, &mut self.residual].into_iter().for_each(|total| total.add(module.residual));
     }
 }
 

@@ -12,7 +12,7 @@ use terrain::{LoadModule, ModuleId, Side, TileId};
 use super::figures::impossible;
 use super::modules::{Modules, at_level};
 use super::opened::unknown_class;
-use super::total::Total;
+use super::total::LevelSums;
 use crate::recount::{RowSides, cracks, cracks_between};
 
 /// What a walk found.
@@ -29,19 +29,6 @@ pub(crate) struct Walked {
     pub decks: BTreeMap<ModuleId, u32>,
     /// Sums of each level.
     pub sums: Vec<LevelSums>,
-}
-
-/// What the load modules of a level add up to.
-#[derive(Default)]
-pub(crate) struct LevelSums {
-    pub modules: usize,
-    pub triangles: u64,
-    pub polygons: u64,
-    pub residual: Total,
-    /// The same of those at the border of the area, and of the others.
-    pub at_border: Total,
-    pub inside: Total,
-    pub decks: DeckFigures,
 }
 
 /// What is found at one level.
@@ -150,19 +137,7 @@ impl OfLevel {
         self.coarser.extend(finer.and_then(|finer| has_new_place(level, &module, finer.as_deref())));
         self.impossible.extend(impossible(area, &module));
         self.polygons.extend(check_polygons(job, level, &module));
-        self.sums.add(area, &module);
-    }
-}
-
-impl LevelSums {
-    fn add(&mut self, area: &GamingArea, module: &LoadModule) {
-        let (id, grid, counts) = (module.id, area.grid, module.counts());
-        let is_outer = id.row == 0 || id.col == 0 || id.row + 1 == grid.rows || id.col + 1 == grid.cols;
-        self.modules += 1;
-        self.triangles += u64::from(counts.triangles);
-        self.polygons += u64::from(counts.polygons);
-        let part = if is_outer { &mut self.at_border } else { &mut self.inside };
-        [part, &mut self.residual].into_iter().for_each(|total| total.add(module.residual));
+        self.sums.add(area.grid, &module);
     }
 }
 

@@ -337,7 +337,7 @@ fn obstacle() -> Value {
 fn explain() -> Value {
     let mut operation = get(
         "One load module, explained",
-        "What it holds, what limits refused there. It reads all load modules, or of more than 16,384 some: one at a time.",
+        "What it holds, what limits refused there. It reads up to 16,384 load modules: one is answered at a time.",
         &["database"],
         &[("application/json", "as `tiefort explain --format json` prints it")],
     );
