@@ -3,6 +3,8 @@
 //! The lock is the system's, on the file `lock`; the file itself means nothing and stays. Removing it would let one
 //! process hold the removed file and another a new one of the same name.
 
+use std::path::Path;
+
 use crate::engine::{Entry, Guard, Held, LockKind};
 
 use crate::{DatabaseError, Folder};
@@ -17,11 +19,18 @@ pub struct Lock {
 }
 
 impl Lock {
-    /// Takes it alone, or a share of it, without waiting: any number of processes may hold one, and no build beside
-    /// them.
+    /// Takes the lock of the database in `dir`, without waiting.
     ///
     /// # Errors
     /// [`DatabaseError::Locked`] when another build holds it; others when the file cannot be made.
+    pub fn acquire(dir: &Path) -> Result<Self, DatabaseError> {
+        Self::take(&Folder::new(dir), LockKind::Alone)
+    }
+
+    /// Takes it alone, or a share of it: any number of processes may hold one, and no build beside them.
+    ///
+    /// # Errors
+    /// As [`Lock::acquire`].
     pub(crate) fn take(folder: &Folder, kind: LockKind) -> Result<Self, DatabaseError> {
         let (path, store) = (folder.path(LOCK_NAME), folder.store());
         // A link would have a file made wherever it leads.
@@ -44,29 +53,24 @@ impl Lock {
 #[cfg(test)]
 mod tests {
     use std::io::{BufRead, BufReader};
-    use std::path::Path;
     use std::process::{Command, Stdio};
 
     use super::*;
-
-    fn acquire(dir: &Path) -> Result<Lock, DatabaseError> {
-        Lock::take(&Folder::new(dir), LockKind::Alone)
-    }
 
     const HELPER_DIR: &str = "TIEFORT_LOCK_TEST_DIR";
 
     #[test]
     fn the_second_to_come_is_refused_until_the_first_lets_go() {
         let folder = tempfile::tempdir().unwrap();
-        let first = acquire(folder.path()).unwrap();
-        let error = acquire(folder.path()).unwrap_err();
+        let first = Lock::acquire(folder.path()).unwrap();
+        let error = Lock::acquire(folder.path()).unwrap_err();
         assert_eq!(Lock::held(&Folder::new(folder.path())), Held::Alone);
         assert!(Lock::take(&Folder::new(folder.path()), LockKind::Shared).unwrap_err().is_transient());
         assert!(error.is_transient());
         assert!(error.to_string().starts_with(&folder.path().display().to_string()));
         drop(first);
         assert_eq!(Lock::held(&Folder::new(folder.path())), Held::Free);
-        acquire(folder.path()).unwrap();
+        Lock::acquire(folder.path()).unwrap();
     }
 
     #[test]
@@ -77,9 +81,9 @@ mod tests {
             Lock::take(&Folder::new(folder.path()), LockKind::Shared).unwrap(),
         ];
         assert_eq!(Lock::held(&Folder::new(folder.path())), Held::Shared);
-        assert!(acquire(folder.path()).unwrap_err().is_transient());
+        assert!(Lock::acquire(folder.path()).unwrap_err().is_transient());
         drop(shares);
-        acquire(folder.path()).unwrap();
+        Lock::acquire(folder.path()).unwrap();
     }
 
     #[cfg(unix)]
@@ -89,7 +93,7 @@ mod tests {
         let elsewhere = tempfile::tempdir().unwrap();
         let made = elsewhere.path().join("made");
         std::os::unix::fs::symlink(&made, folder.path().join(LOCK_NAME)).unwrap();
-        let error = acquire(folder.path()).unwrap_err();
+        let error = Lock::acquire(folder.path()).unwrap_err();
         assert!(matches!(error, DatabaseError::NotAFile { .. }) && error.hint().is_some(), "{error}");
         assert!(!made.exists());
     }
@@ -98,7 +102,7 @@ mod tests {
     #[test]
     fn helper_that_holds_a_lock_until_it_is_killed() {
         let Some(dir) = std::env::var_os(HELPER_DIR) else { return };
-        let _lock = acquire(Path::new(&dir)).unwrap();
+        let _lock = Lock::acquire(Path::new(&dir)).unwrap();
         println!("\nheld");
         loop {
             std::thread::park();
@@ -116,9 +120,9 @@ mod tests {
             .unwrap();
         let lines = BufReader::new(helper.stdout.take().unwrap()).lines();
         assert!(lines.map_while(Result::ok).any(|line| line == "held"), "the helper did not get the lock");
-        assert!(acquire(folder.path()).unwrap_err().is_transient());
+        assert!(Lock::acquire(folder.path()).unwrap_err().is_transient());
         helper.kill().unwrap();
         helper.wait().unwrap();
-        acquire(folder.path()).unwrap();
+        Lock::acquire(folder.path()).unwrap();
     }
 }
