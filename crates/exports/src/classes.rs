@@ -3,8 +3,8 @@
 use store::Report;
 use terrain::{MaterialName, named_class_color};
 
-/// Base colours, as screens show them, of classes whose names say nothing of their colour, in order and over again: told apart by the
-/// colour-blind, too.
+/// Base colours, as screens show them, of classes whose names say nothing of their colour, in order and over again:
+/// told apart by the colour-blind, too.
 const COLOURS: [[f64; 3]; 8] = [
     [0.55, 0.50, 0.36],
     [0.34, 0.42, 0.30],

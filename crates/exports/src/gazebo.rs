@@ -159,7 +159,8 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
         "    <spherical_coordinates>\n      <surface_model>EARTH_WGS84</surface_model>\n      \
          <world_frame_orientation>ENU</world_frame_orientation>\n      \
          <latitude_deg>{latitude:.9}</latitude_deg>\n      <longitude_deg>{longitude:.9}</longitude_deg>\n      \
-         <elevation>{elevation:.3}</elevation>\n      <heading_deg>{heading:.9}</heading_deg>\n    </spherical_coordinates>\n    \
+         <elevation>{elevation:.3}</elevation>\n      <heading_deg>{heading:.9}</heading_deg>\n    \
+         </spherical_coordinates>\n    \
          <light type=\"directional\" name=\"sun\">\n      <cast_shadows>true</cast_shadows>\n      \
          <diffuse>0.9 0.9 0.85 1</diffuse>\n      <direction>0.5 -0.4 -0.8</direction>\n    </light>\n"
     );

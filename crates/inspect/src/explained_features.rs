@@ -15,7 +15,8 @@ pub struct ExplainedFeatures {
     pub share: f64,
     /// The most that features may take of it.
     pub share_max: f64,
-    /// The most that they may take of it where one goes in that is no motorway, primary road, rail, river or large lake.
+    /// The most that they may take of it where one goes in that is no motorway, primary road, rail, river or large
+    /// lake.
     pub share_others: f64,
     /// Cubic metres cut and filled in it, by class.
     pub moved_m3: Vec<(String, [f64; 2])>,

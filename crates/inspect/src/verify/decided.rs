@@ -56,8 +56,8 @@ impl<'a> Decided<'a> {
         Some(format!("survey/{}.lines: a vertex has another height than in the tile beside it, {place}", features.tile))
     }
 
-    /// What is wrong with `level`, where load modules have so many triangles of decks, and, where a report lists them, with
-    /// figures that follow from it.
+    /// What is wrong with `level`, where load modules have so many triangles of decks, and, where a report lists them,
+    /// with figures that follow from it.
     pub fn problems(
         &self,
         level: &AreaLevel,

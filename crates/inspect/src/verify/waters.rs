@@ -54,8 +54,8 @@ impl Waters {
         }
     }
 
-    /// Lakes of 1 ha and more by their posts, those of them that lie off their level, and those of these whose shore had
-    /// no room.
+    /// Lakes of 1 ha and more by their posts, those of them that lie off their level, and those of these whose shore
+    /// had no room.
     pub fn counts(&self, area: &GamingArea) -> [u64; 3] {
         let post_m2 = area.frame.spacing.metres() * area.frame.spacing.metres();
         let large = || self.0.values().filter(|posts| AREA_MIN_M2 <= posts.count as f64 * post_m2);
