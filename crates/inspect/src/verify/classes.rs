@@ -55,12 +55,9 @@ impl Classes {
     ) -> Option<String> {
         let origin = [module.id.col, module.id.row].map(|line| f64::from(line) * f64::from(module.side));
         let far = origin.map(|at| at + f64::from(module.side));
-        let near = |bodies: &'_ [Body]| -> Vec<usize> {
-            (0..bodies.len()).filter(|&body| bodies[body].reaches([origin[0], origin[1], far[0], far[1]])).collect()
-        };
-        let (kept, shaped) = (near(&self.kept), near(&self.shaped));
-        let kept: Vec<&Body> = kept.into_iter().map(|body| &self.kept[body]).collect();
-        let shaped: Vec<&Body> = shaped.into_iter().map(|body| &self.shaped[body]).collect();
+        let extent = [origin[0], origin[1], far[0], far[1]];
+        let [kept, shaped] = [&self.kept, &self.shaped].map(|bodies| reaching(bodies, extent));
+        let places = places();
         let number = (0..module.triangles.len()).find(|&number| {
             let corners = module.triangles[number].map(|corner| {
                 let vertex = module.vertices[usize::from(corner)];
@@ -77,16 +74,17 @@ impl Classes {
             if let Some(own) = class_at(&kept, at([1.0 / 3.0; 3])) {
                 return class != own;
             }
-            let places = places();
-            let has =
-                |wanted: Option<u8>| places.iter().filter(|&&place| class_at(&shaped, at(place)) == wanted).count();
-            let of_own = has(Some(class)) as f64 / places.len() as f64;
-            let of_none = has(None) as f64 / places.len() as f64;
-            if DOUBT.contains(&of_own) || *DOUBT.end() < of_own {
+            let mut covers = [0.0; 256];
+            for &place in &places {
+                if let Some(class) = class_at(&shaped, at(place)) {
+                    covers[usize::from(class)] += 1.0 / places.len() as f64;
+                }
+            }
+            if *DOUBT.start() <= covers[usize::from(class)] {
                 return false;
             }
             let ground = recount::class_of(module, number, mask, grid, spacing);
-            of_none < *DOUBT.start() || ground.is_some_and(|ground| ground != class)
+            covers.iter().any(|cover| DOUBT.end() < cover) || ground.is_some_and(|ground| ground != class)
         })?;
         let (id, class) = (module.id, module.classes[number]);
         Some(format!("load module {id}: triangle {number} has class {class}, the ground under it has another"))
@@ -117,6 +115,11 @@ impl Body {
         let edges = self.rings.iter().flat_map(|ring| (0..ring.len()).map(|i| [ring[i], ring[(i + 1) % ring.len()]]));
         self.reaches([at[0], at[1], at[0], at[1]]) && edges.filter(|&edge| crosses(edge)).count() % 2 == 1
     }
+}
+
+/// Those of some bodies that reach into a rectangle.
+fn reaching(bodies: &[Body], extent: [f64; 4]) -> Vec<&Body> {
+    bodies.iter().filter(|body| body.reaches(extent)).collect()
 }
 
 /// Places all over a triangle, as parts of its corners.

@@ -45,7 +45,7 @@ fn found_of(SeenFeatures { seen, kind_by_name, object_by_name, .. }: &SeenFeatur
     }
     if 0 < seen.coastlines {
         let count = grouped(seen.coastlines as u64);
-        text += &format!("; coastlines ({count}) make no sea: a polygon of it may be a source with kind = \"lake\"");
+        text += &format!("; coastlines ({count}) make no sea: give its polygon kind = \"lake\"");
     }
     text
 }

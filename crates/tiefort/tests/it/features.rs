@@ -75,7 +75,7 @@ fn init_writes_a_section_of_features_that_plan_reads() {
     for part in [
         "found 1 file: 2 x 2 km at 25 m",
         "roads.json: 4 of 5 lie in the area: 1 primary, 2 track, 1 of no kind, which are left out; \
-         coastlines (1) make no sea: a polygon of it may be a source with kind = \"lake\"",
+         coastlines (1) make no sea: give its polygon kind = \"lake\"",
         "water.gpkg, layer lakes: 1 of 2 lie in the area: no tag says what they are, the name says lake",
         "water.gpkg, layer none: no lines or polygons",
     ] {
