@@ -256,7 +256,7 @@ impl Layers<'_> {
 
     fn add_tiles(&self, product: &Product) -> rusqlite::Result<()> {
         let mut add = self.0.begin(&TILES, extent(product, product.grid.all()))?;
-        let is_exported = |modules: &ModuleRect| product.rect.iter().any(|module| modules.contains(module));
+        let is_exported = |modules: &ModuleRect| modules.intersection(product.rect).is_some();
         let Manifest { tiles, area, .. } = &product.manifest;
         for record in tiles {
             let Some(modules) = area.modules_of(record.tile()).filter(is_exported) else { continue };

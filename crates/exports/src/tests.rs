@@ -195,6 +195,8 @@ fn a_package_has_objects_as_layers_whose_pieces_are_one() {
     };
     let (count, class, roof, height, fullness, geometry) = told("buildings");
     assert_eq!((count, class.as_str(), roof, height, fullness), (1, "building", Some(1011.71875), 10.9375, None));
+    let id: String = package.query_row("SELECT id FROM buildings", [], |row| row.get(0)).unwrap();
+    assert_eq!(id, "7", "text, as an object of any number has it elsewhere");
     let word = |at: usize| u32::from_le_bytes(geometry[at..at + 4].try_into().unwrap());
     // One polygon over both load modules, with a courtyard.
     assert_eq!([word(41), word(45), word(50), word(54)], [6, 1, 3, 2]);

@@ -86,6 +86,15 @@ impl TileFile {
         &self.header
     }
 
+    /// One entry per load module and level: level by level, row by row from the south-west.
+    ///
+    /// # Errors
+    /// When the index is read only now and is not as `docs/FORMAT.md` says, or the file is another than when it was
+    /// opened.
+    pub fn index(&self) -> Result<&[IndexEntry], ReadError> {
+        Ok(&self.indexed()?.index)
+    }
+
     /// The index, read now if it was not before.
     fn indexed(&self) -> Result<&Indexed, ReadError> {
         if let Some(indexed) = self.indexed.get() {

@@ -135,16 +135,6 @@ impl ModuleRect {
         self.rows() as usize * self.cols() as usize
     }
 
-    /// The least that holds two.
-    pub fn and(self, other: Self) -> Self {
-        Self {
-            south: self.south.min(other.south),
-            west: self.west.min(other.west),
-            north: self.north.max(other.north),
-            east: self.east.max(other.east),
-        }
-    }
-
     /// What two rectangles have in common; `None` where that is nothing.
     pub fn intersection(self, other: Self) -> Option<Self> {
         let both = Self {

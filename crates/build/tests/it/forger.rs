@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use store::{FileStamp, Fingerprint, Folder, Manifest, Measured, Report, Stamp, TileModules, TileState, files};
-use terrain::{Decks, LoadModule, ModuleVertex, Side, TileTin};
+use terrain::{Decks, Dem, LoadModule, ModuleVertex, Post, Side, TileTin};
 
 use crate::scene::{Scene, Words, tile};
 
@@ -241,6 +241,24 @@ fn altered_reports_are_told() {
         ("refusals", nothing, |f| f.report.refusals.count += 1, "report.json: refusals.count is"),
     ];
     check("constrained", &table);
+}
+
+#[test]
+fn an_altered_class_of_ground_is_told_by_its_raster() {
+    let importance = "areas = [{ slope_above_percent = 20, smooth_m = 0, class = \"steep\", weight = 1 }]".into();
+    let words = Words { size: (2, 2), tiles: (1, 1), importance, ..Words::raster() };
+    let height = |post: Post| 128 * (500 + (post.col - 20).max(0) * 10) + post.row % 3;
+    let scene = Scene::on(&words, &Dem::from_fn(words.grid().area(), |post| Some(height(post))));
+    let built = scene.build("area", 1);
+    built.database.write_json(files::REPORT, &built.report).unwrap();
+    drop(built);
+    scene.verify_on_dem("area");
+    let mut parts = Forged::open(&scene.path("area"));
+    let class = parts.module().classes.iter_mut().next().unwrap();
+    *class = 1 - *class;
+    parts.seal(&scene, "area");
+    let problems = inspect::verify(&scene.path("area"), Some(&scene.path("dem.tif"))).unwrap().problems;
+    assert!(problems.iter().any(|problem| problem.contains("the ground under it has another")), "{problems:?}");
 }
 
 #[test]

@@ -1,8 +1,8 @@
-//! A load module as a square of places in quanta, for what is held against it.
+//! A load module as a square of places in quanta, and what of features is held against it.
 
 use std::collections::{HashMap, HashSet};
 
-use terrain::LoadModule;
+use terrain::{FeatureSurface, LatticePoint, LoadModule};
 
 /// A place in quanta north and east of the area's south-west post.
 pub(crate) type At = (i64, i64);
@@ -53,6 +53,45 @@ impl<'a> Square<'a> {
     pub fn reach(&self) -> [i64; 4] {
         let (side, (south, west)) = (i64::from(self.module.side), self.south_west);
         [south, west, south + side, west + side]
+    }
+}
+
+/// The rings of a body.
+pub(crate) struct Outline {
+    rings: Vec<Vec<At>>,
+    /// South, west, north, east.
+    pub reach: [i64; 4],
+}
+
+impl Outline {
+    /// That of a body whose points lie where `at` says.
+    pub fn of(body: &[FeatureSurface], at: impl Fn(LatticePoint) -> At) -> Self {
+        let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| at(vertex.at)).collect();
+        let rings: Vec<Vec<At>> = body.iter().map(ring).collect();
+        let mut reach = [i64::MAX, i64::MAX, i64::MIN, i64::MIN];
+        for (y, x) in rings.iter().flatten() {
+            reach = [reach[0].min(*y), reach[1].min(*x), reach[2].max(*y), reach[3].max(*x)];
+        }
+        Self { rings, reach }
+    }
+
+    /// Whether it may have something in a rectangle: its southern, western, northern and eastern end.
+    pub fn reaches(&self, [south, west, north, east]: [i64; 4]) -> bool {
+        let [low, left, high, right] = self.reach;
+        low <= north && south <= high && left <= east && west <= right
+    }
+
+    /// Whether a line from a place to the east crosses the rings an odd number of times.
+    pub fn holds(&self, at: At) -> bool {
+        if !self.reaches([at.0, at.1, at.0, at.1]) {
+            return false;
+        }
+        let crosses = |a: At, b: At| {
+            let (low, high) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+            low.0 <= at.0 && at.0 < high.0 && 0 < turn(low, high, at)
+        };
+        let edges = self.rings.iter().flat_map(|ring| (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()])));
+        edges.filter(|(a, b)| crosses(*a, *b)).count() % 2 == 1
     }
 }
 

@@ -8,7 +8,7 @@ use terrain::{FeatureSurface, LoadModule, ModuleId, Post, SurfaceGround, TileFea
 
 use super::laid::Laid;
 use super::modules::Modules;
-use super::square::{At, turn};
+use super::square::{Outline, turn};
 
 /// Smaller lakes are not looked at, in square metres: 1 ha.
 const AREA_MIN_M2: f64 = 10_000.0;
@@ -110,37 +110,4 @@ fn height_m(module: &LoadModule, post: Post, spacing: i64) -> Option<f64> {
     let heights = triangle.map(|vertex| metres_of_quanta(module.vertices[usize::from(vertex)].z));
     let weighed = parts.iter().zip(heights).map(|(part, height)| *part as f64 * height);
     Some(weighed.sum::<f64>() / whole as f64)
-}
-
-/// The rings of a body.
-struct Outline {
-    rings: Vec<Vec<At>>,
-    /// South, west, north, east.
-    reach: [i64; 4],
-}
-
-impl Outline {
-    fn of(body: &[FeatureSurface], at: impl Fn(terrain::LatticePoint) -> At) -> Self {
-        let ring = |surface: &FeatureSurface| surface.ring.iter().map(|vertex| at(vertex.at)).collect();
-        let rings: Vec<Vec<At>> = body.iter().map(ring).collect();
-        let mut reach = [i64::MAX, i64::MAX, i64::MIN, i64::MIN];
-        for (y, x) in rings.iter().flatten() {
-            reach = [reach[0].min(*y), reach[1].min(*x), reach[2].max(*y), reach[3].max(*x)];
-        }
-        Self { rings, reach }
-    }
-
-    /// Whether a line from a place to the east crosses the rings an odd number of times.
-    fn holds(&self, at: At) -> bool {
-        let [south, west, north, east] = self.reach;
-        if !(south..=north).contains(&at.0) || !(west..=east).contains(&at.1) {
-            return false;
-        }
-        let crosses = |a: At, b: At| {
-            let (low, high) = if a.0 <= b.0 { (a, b) } else { (b, a) };
-            low.0 <= at.0 && at.0 < high.0 && 0 < turn(low, high, at)
-        };
-        let edges = self.rings.iter().flat_map(|ring| (0..ring.len()).map(|i| (ring[i], ring[(i + 1) % ring.len()])));
-        edges.filter(|(a, b)| crosses(*a, *b)).count() % 2 == 1
-    }
 }

@@ -134,7 +134,7 @@ pub fn objects_text(job: &Job, tried: &[ObjectBudget]) -> String {
         table.row(limits.into_iter().chain(of.kinds.iter().map(|sums| share([sums.kept_m2, sums.wanted_m2]))));
     }
     let own = job.objects.as_ref().map_or(0, |spec| spec.per_load_module);
-    let joint = match job.counts_objects() {
+    let joint = match job.counts_objects() && tried.last().is_some_and(|last| !last.holds()) {
         true => " They count in the limits of the ground, which hold back more: larger ones there keep it.",
         false => "",
     };

@@ -143,7 +143,7 @@ fn run(seed: u64) -> bool {
     product.check(Edges::Constrained);
     check_limits(&scene.job, &product, &built, Edges::Constrained);
     drop(built);
-    scene.verify("area.tdb");
+    scene.verify_on_dem("area.tdb");
     Laid::open(&scene).check();
     drop(scene.build("alone.tdb", 1));
     assert_same(&scene.product("alone.tdb"), &scene.product("area.tdb"), "by one worker and by two");
