@@ -38,5 +38,5 @@ fn half_window(window: &Window, rect: PostRect) -> Window {
             Importance::new(dem.rect(), dem.rect().posts().map(weight).collect(), vec![0; dem.rect().post_count()])
         }
     };
-    Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() }
+    Window::of(dem, importance)
 }

@@ -60,10 +60,10 @@ fn classes_of(job: &Job) -> Vec<u8> {
 struct Piece {
     features: TileFeatures,
     numbers: HashMap<Place, u32>,
-    /// Rings by body: the body's number in the area, then class, ground and ring.
-    bodies: BTreeMap<u32, Vec<FeatureSurface>>,
+    /// Rings of each body.
+    bodies: Vec<Vec<FeatureSurface>>,
     /// The same of what is not in the TIN.
-    shaped: BTreeMap<u32, Vec<FeatureSurface>>,
+    shaped: Vec<Vec<FeatureSurface>>,
 }
 
 impl Piece {
@@ -98,8 +98,7 @@ impl Piece {
 }
 
 /// Rings of bodies, which are numbered in an order that depends on nothing but the content.
-fn in_order(bodies: BTreeMap<u32, Vec<FeatureSurface>>) -> Vec<FeatureSurface> {
-    let mut bodies: Vec<Vec<FeatureSurface>> = bodies.into_values().collect();
+fn in_order(mut bodies: Vec<Vec<FeatureSurface>>) -> Vec<FeatureSurface> {
     bodies.iter_mut().for_each(|rings| rings.sort());
     bodies.sort();
     (0..).zip(bodies).flat_map(|(body, rings)| with_body(rings, body)).collect()
@@ -176,33 +175,34 @@ impl Cutting<'_> {
     fn surfaces(&mut self, surfaces: &[Surface], is_held: bool, whole: &BTreeSet<(u16, Vec<Place>)>) {
         let is_whole = |surface: &Surface| is_one_of(whole, surface);
         // Rings of one feature and role at one level are one body; strips are bodies of their own.
-        let mut bodies: BTreeMap<(u16, Role, FeatureId, i32), u32> = BTreeMap::new();
-        let mut next = 0;
-        for surface in surfaces {
+        let mut bodies: BTreeMap<(u16, Role, FeatureId, i32, usize), Vec<&Surface>> = BTreeMap::new();
+        for (number, surface) in surfaces.iter().enumerate() {
             let level = if surface.role == Role::Shore { surface.ring[0].1 } else { 0 };
-            let key = (surface.class, surface.role, surface.id, level);
-            let body = match bodies.get(&key).filter(|_| surface.role != Role::Side) {
-                Some(&body) => body,
-                None => {
-                    bodies.insert(key, next);
-                    next += 1;
-                    next - 1
-                }
-            };
-            let ground = match surface.role {
+            let own = if surface.role == Role::Side { number } else { 0 };
+            bodies.entry((surface.class, surface.role, surface.id, level, own)).or_default().push(surface);
+        }
+        for body in bodies.values() {
+            let ground = match body[0].role {
                 Role::Shore => SurfaceGround::Lake,
                 Role::Bank => SurfaceGround::River,
-                _ if is_whole(surface) => SurfaceGround::Strip,
+                _ if is_whole(body[0]) => SurfaceGround::Strip,
                 _ => SurfaceGround::Road,
             };
-            let class = self.classes[usize::from(surface.class)];
-            let ring: Vec<Vertex> = surface.ring.iter().copied().map(vertex).collect();
+            let class = self.classes[usize::from(body[0].class)];
+            let of = |surface: &&Surface| {
+                let ring = surface.ring.iter().copied().map(vertex).collect();
+                FeatureSurface { class, ground, body: 0, ring }
+            };
+            let rings: Vec<FeatureSurface> = body.iter().map(of).collect();
             // A shore lifts the ground within a post of it.
             let reach = if ground == SurfaceGround::Lake { self.steps } else { 0 };
-            for index in self.touching(surface.ring.iter().map(|(place, _)| *place), reach) {
-                let ring = FeatureSurface { class, ground, body: 0, ring: ring.clone() };
+            let touching = |ring: &&Surface| self.touching(ring.ring.iter().map(|(place, _)| *place), reach);
+            // All that one ring touches have the whole body, so that bodies stand in one order everywhere and a post
+            // on a line between tiles has the same bank nearest to it.
+            let tiles: BTreeSet<usize> = body.iter().flat_map(touching).collect();
+            for index in tiles {
                 let Piece { bodies, shaped, .. } = &mut self.pieces[index];
-                if is_held { bodies } else { shaped }.entry(body).or_default().push(ring);
+                if is_held { bodies } else { shaped }.push(rings.clone());
             }
         }
     }

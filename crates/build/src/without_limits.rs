@@ -46,7 +46,7 @@ fn without_limit(
 ) -> ModuleResidual {
     let rect = part.rect;
     let (dem, importance) = (window.dem.window(rect), window.importance.window(rect));
-    let window = Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() };
+    let window = Window::of(dem, importance);
     let optimising = optimising(run.job);
     // What is filled has its sides and features already and counts all vertices; what is selected starts from them.
     let (features, sides, points) = match optimising {

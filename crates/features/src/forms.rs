@@ -122,7 +122,8 @@ pub(crate) fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each,
         formed = forming.round_together(scope).0;
     }
     let Forming { sharing, thinned, .. } = forming;
-    formed.middles = middles(graded, (&pieces, &sharing.wide), (strands, &thinned), &formed.points, site);
+    let decided = (&formed.points[..], &formed.faces[..]);
+    formed.middles = middles(graded, (&pieces, &sharing.wide), (strands, &thinned), decided, site);
     remark_rooms(network, &pieces, &sharing.wide, &mut remarks);
     formed.remarks.append(&mut remarks);
     Remark::sort(&mut formed.remarks);
@@ -536,6 +537,26 @@ mod tests {
         }
     }
 
+    /// Every station of a line in the ground lies on what was decided for the ground there: at a point, or in a strip.
+    #[track_caller]
+    fn check_lines_lie(formed: &Formed) {
+        let is_line = |middle: &&Middle| middle.traits.is_in_ground && middle.traits.form == terrain::LineForm::Line;
+        for (place, height) in formed.middles.iter().filter(is_line).flat_map(|middle| &middle.stations) {
+            if let Ok(at) = formed.points.binary_search_by_key(place, |(other, _)| *other) {
+                assert_eq!(formed.points[at].1, *height, "{place:?}");
+                continue;
+            }
+            let off = |face: &Face| {
+                let (places, ring): (Vec<Place>, Vec<_>) =
+                    face.corners.iter().map(|&(at, height)| (at, terrain::Vertex { at: at.into(), height })).unzip();
+                let is_inside = crate::rings::encloses(&places, *place) || is_on_outline(face, *place);
+                is_inside.then(|| (crate::rings::height_in(&[&ring], (*place).into()) - height).abs())
+            };
+            let off = formed.faces.iter().filter_map(off).min();
+            assert!(off.is_some_and(|off| off <= 32), "{place:?} lies {off:?} quanta off every strip");
+        }
+    }
+
     #[test]
     fn sides_of_two_widths_meet_square_to_the_road_and_inner_sides_of_bends_keep_its_grade() {
         let sources = vec![
@@ -692,6 +713,7 @@ mod tests {
             let sources = network_of(&lines);
             let there = formed(sources.clone(), bowl);
             check_sides(&there, &rounded(sources.clone()).ways);
+            check_lines_lie(&there);
             let back = formed(sources.into_iter().rev().collect(), bowl);
             prop_assert_eq!(there, back);
         }

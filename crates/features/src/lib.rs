@@ -56,7 +56,7 @@ mod crowd;
 pub use crowd::STATIONS_PER_MODULE_MAX;
 mod gaps;
 mod rings;
-pub use rings::{Ring, doubled_area, encloses};
+pub use rings::{Ring, doubled_area, encloses, height_in};
 mod ways;
 pub use ways::{Area, Way};
 mod mend;

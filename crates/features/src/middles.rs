@@ -3,14 +3,16 @@
 //! They are what a map draws and what a simulator drives along. Where a line crosses one between load modules it has a
 //! station, so that its parts in both meet there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
-use terrain::{LineForm, LineKind, LineStorey, LineTraits};
+use terrain::{LineForm, LineKind, LineStorey, LineTraits, Vertex};
 
 use crate::decks::between;
 use crate::exact::Segment;
 use crate::pieces::Piece;
-use crate::strips::{Room, Wide};
+use crate::rings::{encloses, height_in};
+use crate::room::Squares;
+use crate::strips::{Face, Room, Wide};
 use crate::thin::{Station, Tolerance, thin};
 use crate::{FeatureId, Graded, Network, Place, Role, Site, Storey, Strand, Traits};
 
@@ -30,13 +32,17 @@ pub struct Middle {
 /// What lines are thinned with that are no edges.
 const TOLERANCE_OUT: Tolerance = Tolerance::ALL[1];
 
+/// A line inside another way's strip has its own height where the strip lies no farther off than so many quanta
+/// (0.25 m): rounding moves either.
+const OFF_MAX: i32 = 32;
+
 /// The middle lines of a network that was cut into `pieces`, of which `wide` are strips, and of all strands, of which
-/// `thinned` are in the ground, whose heights were decided at `points`.
+/// `thinned` are in the ground, whose heights were decided at `points` and on `faces`.
 pub(crate) fn middles(
     graded: &Graded,
     (pieces, wide): (&[Piece], &[Wide]),
     (strands, thinned): (&[Strand], &[Strand]),
-    points: &[(Place, i32)],
+    (points, faces): (&[(Place, i32)], &[Face]),
     site: &Site,
 ) -> Vec<Middle> {
     let mut middles = of_pieces(graded, pieces, wide);
@@ -52,6 +58,7 @@ pub(crate) fn middles(
         middles.extend(left_out(strand, kept, site).into_iter().map(|strand| of_strand(strand, false)));
     }
     middles.iter_mut().for_each(|middle| cross_lines(&mut middle.stations, site));
+    lay(&mut middles, points, (faces, site));
     let mut middles: Vec<Middle> = middles.into_iter().flat_map(|middle| in_culverts(middle, points)).collect();
     middles.retain(|middle| 2 <= middle.stations.len());
     middles.sort();
@@ -161,7 +168,44 @@ fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
     parts
 }
 
-/// A channel in parts: where the ground has another height than it, as on a road, it passes below in a culvert.
+/// Lays lines in the ground onto it where another way has it: at places that lie as high as that way, and inside its
+/// strip. What another line has there at the same height moves with them, so that parts of a way still meet.
+fn lay(middles: &mut [Middle], points: &[(Place, i32)], (faces, site): (&[Face], &Site)) {
+    let (mut ground, mut inside) = (HashMap::new(), Vec::new());
+    for Middle { traits, stations, .. } in middles.iter().filter(|of| is_laid(&of.traits) && of.traits.is_in_ground) {
+        for &(place, height) in stations {
+            if let Ok(at) = points.binary_search_by_key(&place, |(other, _)| *other) {
+                ground.insert((place, height), points[at].1);
+            } else if traits.form == LineForm::Line {
+                // A strip lies under its own middle.
+                inside.push((place, height));
+            }
+        }
+    }
+    let near = Squares::around(inside.iter().map(std::slice::from_ref), site.lattice);
+    let ring = |face: &Face| -> (Vec<Place>, Vec<Vertex>) {
+        face.corners.iter().map(|&(place, height)| (place, Vertex { at: place.into(), height })).unzip()
+    };
+    let rings: Vec<_> = faces.iter().filter(|face| near.have(&face.corners)).map(ring).collect();
+    for (place, height) in inside {
+        let Some((_, ring)) = rings.iter().find(|(places, _)| encloses(places, place)) else { continue };
+        let there = height_in(&[ring], place.into());
+        if OFF_MAX < (there - height).abs() {
+            ground.insert((place, height), there);
+        }
+    }
+    for station in middles.iter_mut().filter(|middle| is_laid(&middle.traits)).flat_map(|of| &mut of.stations) {
+        station.1 = ground.get(station).copied().unwrap_or(station.1);
+    }
+}
+
+/// Whether a line follows ground that another way has; channels pass below.
+fn is_laid(traits: &LineTraits) -> bool {
+    traits.kind != LineKind::Channel
+}
+
+/// A channel in parts: where the ground has another height than it, as on a road, or a strip covers it, it passes below
+/// in a culvert.
 fn in_culverts(middle: Middle, points: &[(Place, i32)]) -> Vec<Middle> {
     let Middle { class, traits, id, stations } = middle;
     if traits.kind != LineKind::Channel || !traits.is_in_ground {
@@ -169,7 +213,7 @@ fn in_culverts(middle: Middle, points: &[(Place, i32)]) -> Vec<Middle> {
     }
     let passes = |(place, height): &(Place, i32)| {
         let found = points.binary_search_by_key(place, |(other, _)| *other);
-        found.is_ok_and(|found| points[found].1 != *height)
+        found.is_err() || found.is_ok_and(|found| points[found].1 != *height)
     };
     let is_below: Vec<bool> = stations.windows(2).map(|ends| ends.iter().any(passes)).collect();
     let mut from = 0;
@@ -263,13 +307,17 @@ mod tests {
             ..of_number(&formed, 2)[0].clone()
         };
         let ground = |at: i32, height| (Place::new(0, at), height);
-        assert_eq!(in_culverts(middle.clone(), &[ground(0, 100), ground(4, 60)]), std::slice::from_ref(&middle));
-        // A road at the third station: the pieces before and behind it pass below.
-        let parts = in_culverts(middle.clone(), &[ground(1, 90), ground(2, 400), ground(4, 60)]);
-        let told: Vec<_> = parts.iter().map(|part| (part.stations.len(), part.traits.is_in_ground)).collect();
-        assert_eq!(told, [(2, true), (3, false), (2, true)]);
-        assert!(parts.iter().all(|part| part.traits.is_kept && part.traits.fit()));
-        assert_eq!(parts[1].traits.storey, LineStorey::Tunnel);
+        let points = [0, 1, 2, 3, 4].map(|at| ground(at, 100 - 10 * at));
+        assert_eq!(in_culverts(middle.clone(), &points), std::slice::from_ref(&middle));
+        // A road at the third station, or a strip around it: the pieces before and behind it pass below.
+        let road = [points[0], points[1], ground(2, 400), points[3], points[4]];
+        for points in [&road[..], &[points[0], points[1], points[3], points[4]]] {
+            let parts = in_culverts(middle.clone(), points);
+            let told: Vec<_> = parts.iter().map(|part| (part.stations.len(), part.traits.is_in_ground)).collect();
+            assert_eq!(told, [(2, true), (3, false), (2, true)]);
+            assert!(parts.iter().all(|part| part.traits.is_kept && part.traits.fit()));
+            assert_eq!(parts[1].traits.storey, LineStorey::Tunnel);
+        }
     }
 
     #[test]

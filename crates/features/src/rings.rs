@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use terrain::{LatticePoint, Vertex};
+
 use crate::Place;
 use crate::clean::Notes;
 use crate::place::turn;
@@ -36,6 +38,33 @@ pub fn encloses(ring: &[Place], place: Place) -> bool {
         }
     }
     inside
+}
+
+/// The height of rings at a place inside, in quanta: that of the plane of the corners that it lies between.
+pub fn height_in(rings: &[&[Vertex]], at: LatticePoint) -> i32 {
+    let cross = |a: LatticePoint, b: LatticePoint, c: LatticePoint| {
+        let [ax, ay, bx, by] = [b.col - a.col, b.row - a.row, c.col - a.col, c.row - a.row].map(i64::from);
+        ax * by - ay * bx
+    };
+    let fans = rings.iter().flat_map(|ring| ring.windows(2).skip(1).map(|pair| [ring[0], pair[0], pair[1]]));
+    for [a, b, c] in fans {
+        let whole = cross(a.at, b.at, c.at);
+        let parts =
+            [cross(b.at, c.at, at), cross(c.at, a.at, at), cross(a.at, b.at, at)].map(|part| part * whole.signum());
+        if whole != 0 && parts.iter().all(|part| 0 <= *part) {
+            let heights = [a, b, c].map(|vertex| i64::from(vertex.height));
+            let sum: i128 =
+                parts.iter().zip(heights).map(|(part, height)| i128::from(*part) * i128::from(height)).sum();
+            let whole = i128::from(whole.abs());
+            return (2 * sum + whole).div_euclid(2 * whole) as i32;
+        }
+    }
+    // Rounding has bent the ring: the nearest corner says it.
+    let squared = |vertex: &&Vertex| {
+        let [rows, cols] = [vertex.at.row - at.row, vertex.at.col - at.col].map(i64::from);
+        rows * rows + cols * cols
+    };
+    rings.iter().copied().flatten().min_by_key(squared).map_or(0, |vertex| vertex.height)
 }
 
 /// A ring without its repeated end; one that is open is closed by a straight line if that is short enough.

@@ -78,6 +78,29 @@ impl Dem {
         dem
     }
 
+    /// One window of several that cover it together. A post that some of them share has the same height in all.
+    pub fn joined(rect: PostRect, parts: &[&Self]) -> Self {
+        let mut dem = Self::from_row_fn(rect, |row, heights| {
+            for part in parts {
+                let Some(both) = part.rect.intersection(&rect) else { continue };
+                if both.south <= row && row <= both.north {
+                    let [from, to] = [part.rect, rect].map(|of| (both.west - of.west) as usize);
+                    let wide = both.posts_wide();
+                    heights[to..to + wide].copy_from_slice(&part.row(row)[from..from + wide]);
+                }
+            }
+        });
+        for part in parts.iter().filter(|part| 0 < part.void_count) {
+            let both = part.rect.intersection(&rect);
+            for post in both.iter().flat_map(PostRect::posts).filter(|&post| part.is_void(post)) {
+                if !dem.is_void(post) {
+                    dem.mark_void(post);
+                }
+            }
+        }
+        dem
+    }
+
     fn empty(rect: PostRect) -> Self {
         let padded = rect.posts_wide().next_multiple_of(LANES) + LANES;
         let stride = if padded.is_power_of_two() { padded + LANES } else { padded };

@@ -42,6 +42,24 @@ impl Importance {
         Self { rect, weights, classes, default_weight: first }
     }
 
+    /// One window of several that cover it together. A post that some of them share is the same in all.
+    pub fn joined(rect: PostRect, parts: &[&Self]) -> Self {
+        let is_plain = |part: &&Self| part.uniform_weight() == parts[0].uniform_weight() && part.classes.is_empty();
+        if let Some(weight) = parts[0].uniform_weight()
+            && parts.iter().all(is_plain)
+        {
+            return Self::uniform(rect, weight);
+        }
+        let (mut weights, mut classes) = (vec![0; rect.post_count()], vec![0; rect.post_count()]);
+        for part in parts {
+            for post in part.rect.intersection(&rect).iter().flat_map(PostRect::posts) {
+                let index = rect.index(post);
+                (weights[index], classes[index]) = (part.weight(post), part.class(post));
+            }
+        }
+        Self::new(rect, weights, classes)
+    }
+
     /// The posts this window holds.
     pub fn rect(&self) -> PostRect {
         self.rect

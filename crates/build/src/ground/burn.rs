@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use features::{CUT_RUN, FILL_RUN, WATERSIDE_REACH_M, Watersides, nearest_on};
+use features::{CUT_RUN, FILL_RUN, WATERSIDE_REACH_M, Watersides, height_in, nearest_on};
 use terrain::{Dem, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
@@ -25,19 +25,14 @@ pub fn waterside_reach(spacing: Spacing) -> i32 {
     (WATERSIDE_REACH_M / spacing.metres()).ceil() as i32
 }
 
-/// A window with what features put into the ground of a tile that covers `tile`, as far as it reaches into it.
-pub fn burn(
-    window: Window,
-    features: &TileFeatures,
-    tile: PostRect,
-    (spacing, left_out_weight): (Spacing, f64),
-) -> Window {
+/// A window of natural ground in a tile, with what features put into the tile. A post is burned the same whichever tile
+/// it lies in and whichever window of it asks.
+pub fn burn(window: Window, features: &TileFeatures, (spacing, left_out_weight): (Spacing, f64)) -> Window {
     let TileFeatures { surfaces, shaped, slopes, watersides, .. } = features;
     if surfaces.is_empty() && shaped.is_empty() && slopes.is_empty() && watersides.is_empty() {
         return window;
     }
-    let Some(within) = tile.intersection(&window.dem.rect()) else { return window };
-    let mut burning = Burning::new(&window, features, within, spacing);
+    let mut burning = Burning::new(&window, features, spacing);
     burning.watersides();
     burning.slopes();
     burning.surfaces();
@@ -53,11 +48,7 @@ pub fn burn(
         let index = rect.index(*post);
         class_of[index].is_some() || (is_changed(post) && !is_shaped[index])
     };
-    let changed = rect.posts().filter(is_featured);
-    // What the features of another tile changed stays changed.
-    let mut featured: Vec<Post> = window.featured.iter().copied().chain(changed).collect();
-    featured.sort_unstable();
-    featured.dedup();
+    let featured = rect.posts().filter(is_featured).collect();
     Window { dem, importance, featured, ..window }
 }
 
@@ -84,8 +75,6 @@ fn importance(
 
 struct Burning<'a> {
     rect: PostRect,
-    /// The posts that may change.
-    within: PostRect,
     features: &'a TileFeatures,
     spacing: Spacing,
     /// Steps between posts.
@@ -98,19 +87,19 @@ struct Burning<'a> {
 }
 
 impl<'a> Burning<'a> {
-    fn new(window: &Window, features: &'a TileFeatures, within: PostRect, spacing: Spacing) -> Self {
+    fn new(window: &Window, features: &'a TileFeatures, spacing: Spacing) -> Self {
         let rect = window.dem.rect();
         let heights: Vec<Option<i32>> =
             rect.posts().map(|post| (!window.dem.is_void(post)).then(|| window.dem.height(post))).collect();
         let (class_of, is_shaped) = (vec![None; heights.len()], vec![false; heights.len()]);
-        Self { rect, within, features, spacing, steps: features.kept.steps_per_post, heights, class_of, is_shaped }
+        Self { rect, features, spacing, steps: features.kept.steps_per_post, heights, class_of, is_shaped }
     }
 
     /// Leads the ground beside water to it.
     fn watersides(&mut self) {
         let metres_per_step = self.spacing.metres() / f64::from(self.steps);
         let watersides = Watersides::of(&self.features.watersides, metres_per_step);
-        for post in self.within.posts() {
+        for post in self.rect.posts() {
             let index = self.rect.index(post);
             self.heights[index] = self.heights[index].map(|natural| watersides.ground(self.place(post), natural));
         }
@@ -147,7 +136,7 @@ impl<'a> Burning<'a> {
         for (body, is_held) in bodies.chain(features.shaped_bodies().map(|body| (body, false))) {
             let rings: Vec<&[Vertex]> = body.iter().map(|surface| &surface.ring[..]).collect();
             let banks = (body[0].ground == SurfaceGround::River).then(|| Near::of(&rings, self.steps));
-            for post in posts_inside(&rings, self.steps, self.within) {
+            for post in posts_inside(&rings, self.steps, self.rect) {
                 let index = self.rect.index(post);
                 if self.class_of[index].is_some() || self.is_shaped[index] {
                     continue;
@@ -200,8 +189,8 @@ impl<'a> Burning<'a> {
         let north = rows.max().unwrap_or(-1) + 1 + reach;
         let west = cols.clone().min().unwrap_or(0) - reach;
         let east = cols.max().unwrap_or(-1) + 1 + reach;
-        let within = PostRect { south, west, north, east }.intersection(&self.within);
-        within.into_iter().flat_map(|rect| rect.posts())
+        let near = PostRect { south, west, north, east }.intersection(&self.rect);
+        near.into_iter().flat_map(|rect| rect.posts())
     }
 }
 
@@ -243,29 +232,6 @@ pub fn posts_inside(rings: &[&[Vertex]], steps: i32, rect: PostRect) -> Vec<Post
         }
     }
     posts
-}
-
-/// The height of a ring at a place inside: that of the plane of the corners that it lies between.
-fn height_in(rings: &[&[Vertex]], at: LatticePoint) -> i32 {
-    let cross = |a: LatticePoint, b: LatticePoint, c: LatticePoint| {
-        let [ax, ay, bx, by] = [b.col - a.col, b.row - a.row, c.col - a.col, c.row - a.row].map(i64::from);
-        ax * by - ay * bx
-    };
-    let fans = rings.iter().flat_map(|ring| ring.windows(2).skip(1).map(|pair| [ring[0], pair[0], pair[1]]));
-    for [a, b, c] in fans {
-        let whole = cross(a.at, b.at, c.at);
-        let parts =
-            [cross(b.at, c.at, at), cross(c.at, a.at, at), cross(a.at, b.at, at)].map(|part| part * whole.signum());
-        if whole != 0 && parts.iter().all(|part| 0 <= *part) {
-            let heights = [a, b, c].map(|vertex| i64::from(vertex.height));
-            let sum: i128 =
-                parts.iter().zip(heights).map(|(part, height)| i128::from(*part) * i128::from(height)).sum();
-            let whole = i128::from(whole.abs());
-            return (2 * sum + whole).div_euclid(2 * whole) as i32;
-        }
-    }
-    // Rounding has bent the ring: the nearest corner says it.
-    rings.iter().copied().flatten().min_by_key(|vertex| squared(vertex.at, at)).map_or(0, |vertex| vertex.height)
 }
 
 /// The squared distance of two places, in squared steps.
@@ -330,7 +296,7 @@ mod tests {
         let rect = PostRect::new(Post::new(0, 0), Post::new(20, 20));
         let dem = Dem::from_fn(rect, height);
         let importance = Importance::uniform(rect, 1000);
-        Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() }
+        Window::of(dem, importance)
     }
 
     /// A vertex at posts (row, column) and a height.
@@ -349,8 +315,7 @@ mod tests {
     }
 
     fn burned(window: Window, features: &TileFeatures) -> Window {
-        let tile = window.dem.rect();
-        burn(window, features, tile, (Spacing::from_metres(10.0).unwrap(), 2.0))
+        burn(window, features, (Spacing::from_metres(10.0).unwrap(), 2.0))
     }
 
     #[test]

@@ -8,7 +8,7 @@ use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
 use store::Folder;
 use terrain::mask::Mask;
-use terrain::{Dem, GridFrame, Importance, PostRect, TileFeatures, TileId};
+use terrain::{Dem, GridFrame, PostRect, TileFeatures, TileId};
 
 use crate::ground::area::GamingArea;
 use crate::ground::bounds::Bounds;
@@ -160,7 +160,7 @@ impl Ground {
         self.fault.take()?;
         let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
         let importance = terrain::mask::without_voids(self.given.weigh(importance, &place), &dem);
-        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
+        Ok(Window::of(dem, importance))
     }
 
     fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
@@ -198,7 +198,7 @@ impl Ground {
         kept_or(lines.kept(area.tiling.index(tile)), || {
             // Points that the job gives are looked up in what they are given for.
             let natural = Window::clone(&*self.natural_tile(area, tile)?);
-            let window = lines.burn_tile(natural, tile, area.tiling.rect(tile))?;
+            let window = lines.burn_tile(natural, tile)?;
             self.with_given(area, tile, window)
         })
     }
@@ -226,17 +226,7 @@ impl Ground {
             return self.window(rect);
         }
         let parts = near.iter().map(|&other| self.tile(area, other)).collect::<Result<Vec<_>, _>>()?;
-        let dem = Dem::from_row_fn(rect, |row, heights| {
-            for (part, cols) in
-                parts.iter().filter_map(|part| overlap(part.dem.rect(), rect, row).map(|cols| (part, cols)))
-            {
-                let (from, to) = (cols.start - part.dem.rect().west, cols.start - rect.west);
-                let part = &part.dem.row(row)[from as usize..][..cols.len()];
-                heights[to as usize..][..cols.len()].copy_from_slice(part);
-            }
-        });
-        let importance = join_importance(&parts, rect);
-        Ok(Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() })
+        Ok(Window::joined(rect, &parts.iter().map(|part| &**part).collect::<Vec<_>>()))
     }
 
     /// The ground of any rectangle of the area, with features burned in if there are any.
@@ -246,7 +236,7 @@ impl Ground {
     pub fn window(&self, rect: PostRect) -> Result<Window, GroundError> {
         let natural = self.natural(rect)?;
         match self.lines.get() {
-            Some(lines) => lines.burn(natural),
+            Some(lines) => lines.burn(&natural),
             None => Ok(natural),
         }
     }
@@ -276,33 +266,6 @@ pub(crate) fn kept_or(
 /// Whether a halo never reaches beyond a tile.
 fn reaches(tile: PostRect, halo: i32) -> bool {
     halo <= tile.cells_wide().min(tile.cells_high()) as i32
-}
-
-/// The columns of a row that a part holds of a whole.
-fn overlap(part: PostRect, whole: PostRect, row: i32) -> Option<std::ops::Range<i32>> {
-    let cut = part.intersection(&whole)?;
-    (cut.south <= row && row <= cut.north).then_some(cut.west..cut.east + 1)
-}
-
-fn join_importance(parts: &[Arc<Window>], rect: PostRect) -> Importance {
-    let first = parts[0].importance.uniform_weight();
-    let is_plain = |part: &Arc<Window>| {
-        part.importance.uniform_weight() == first
-            && part.importance.classes_of_row(part.importance.rect().south).is_none()
-    };
-    if let Some(weight) = first
-        && parts.iter().all(is_plain)
-    {
-        return Importance::uniform(rect, weight);
-    }
-    let holder = |post| parts.iter().find(|part| part.importance.rect().contains(post)).expect("parts cover the whole");
-    let posts = || {
-        (rect.south..=rect.north)
-            .flat_map(move |row| (rect.west..=rect.east).map(move |col| terrain::Post::new(row, col)))
-    };
-    let weights = posts().map(|post| holder(post).importance.weight(post)).collect();
-    let classes = posts().map(|post| holder(post).importance.class(post)).collect();
-    Importance::new(rect, weights, classes)
 }
 
 /// Finds the level of each body of water from the heights of all tiles; what a person should know about it.

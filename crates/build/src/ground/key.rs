@@ -73,7 +73,7 @@ mod tests {
     }
 
     fn window(dem: Dem, importance: Importance) -> Window {
-        Window { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() }
+        Window::of(dem, importance)
     }
 
     fn flat(rect: PostRect, odd: Post) -> Window {

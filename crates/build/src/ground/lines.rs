@@ -53,14 +53,17 @@ impl Lines {
     }
 
     /// The window of a tile with its features; its neighbours add nothing that it does not have.
-    pub fn burn_tile(&self, window: Window, tile: TileId, rect: PostRect) -> Result<Window, GroundError> {
-        Ok(burn(window, &*self.features(tile)?, rect, (self.spacing, self.left_out_weight)))
+    pub fn burn_tile(&self, window: Window, tile: TileId) -> Result<Window, GroundError> {
+        Ok(burn(window, &*self.features(tile)?, (self.spacing, self.left_out_weight)))
     }
 
-    /// A window with the features of all tiles that it touches.
-    pub fn burn(&self, window: Window) -> Result<Window, GroundError> {
+    /// A window with the features of all tiles that it touches. What lies on a line between tiles is burned from the
+    /// natural ground by each, and the same by all.
+    pub fn burn(&self, window: &Window) -> Result<Window, GroundError> {
         let rect = window.dem.rect();
-        let mut touched = self.tiles.iter().filter(|(_, tile)| tile.intersection(&rect).is_some());
-        touched.try_fold(window, |window, &(tile, of)| self.burn_tile(window, tile, of))
+        let touched = self.tiles.iter().filter_map(|(tile, of)| Some((*tile, of.intersection(&rect)?)));
+        let part = |(tile, of)| self.burn_tile(Window::of(window.dem.window(of), window.importance.window(of)), tile);
+        let parts = touched.map(part).collect::<Result<Vec<_>, _>>()?;
+        Ok(Window::joined(rect, &parts.iter().collect::<Vec<_>>()))
     }
 }

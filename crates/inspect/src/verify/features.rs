@@ -88,8 +88,9 @@ pub(crate) fn check(
         aside = ROUNDED * laid.step() as f64;
     }
     let (network, faults) = network(job, area, modules, &level, (&waters, aside));
+    let files_agree = problems.is_empty();
     problems.extend(faults);
-    if !problems.is_empty() {
+    if !files_agree {
         return Ok(Found { problems, unchecked: Vec::new(), network: Some(network) });
     }
     problems.extend(decided.problems(&level, decks, listed.map(|features| &features.checks)));
@@ -125,7 +126,7 @@ fn network(
     let WaysFound { kept_m, pieces_missing, gaps } = ways.found;
     let count = ends.len() as u64;
     let found = NetworkFound { kept_m, pieces_missing, gaps, ends: count, lakes, lakes_off_level, lakes_without_shore };
-    let mut problems: Vec<String> = ways.problem(area).into_iter().collect();
+    let mut problems: Vec<String> = ways.problems(area);
     let quanta = |at: f64, origin: f64| ((at - origin) * f64::from(QUANTA_PER_METRE)).round() as i64;
     let frame = area.frame;
     let listed: BTreeSet<At> = level

@@ -188,7 +188,7 @@ fn along(corners: &[[f64; 3]; 3], [a, b]: [At; 2], see: &mut impl FnMut(f64)) {
 }
 
 /// Height of a triangle at a place in it.
-fn height_at([a, b, c]: &[[f64; 3]; 3], [x, y]: At) -> Option<f64> {
+pub(super) fn height_at([a, b, c]: &[[f64; 3]; 3], [x, y]: At) -> Option<f64> {
     let (ux, uy, vx, vy) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
     let all = ux * vy - uy * vx;
     let (px, py) = (x - a[0], y - a[1]);

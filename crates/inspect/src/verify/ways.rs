@@ -1,5 +1,6 @@
 //! Roads and rivers as the middle lines of load modules tell them, against the triangles: whether what is kept has its
-//! edges, from end to end, and where it ends although its way goes on. Only files of load modules are asked.
+//! edges, from end to end, and lies on the ground, and where it ends although its way goes on. Only files of load
+//! modules are asked.
 
 use std::collections::BTreeMap;
 
@@ -10,6 +11,7 @@ use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, QUANTA_PER_METRE, me
 use super::laid::place_text;
 use super::modules::Modules;
 use super::square::{At, Square};
+use super::standing::height_at;
 
 /// Shorter stretches without edges are what rounding leaves, in metres.
 const BARE_MIN_M: f64 = 3.0;
@@ -17,6 +19,8 @@ const BARE_MIN_M: f64 = 3.0;
 const GAP_MIN_M: f64 = 30.0;
 /// A deck that lies farther above or below a line carries another way, in quanta.
 const DECK_OFF: i32 = QUANTA_PER_METRE;
+/// A vertex of a line in the ground may lie so many metres off it: rounding moves lines and the strips they lie in.
+const OFF_MAX_M: f64 = 0.5;
 
 /// What is found of the ways of an area.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,6 +39,8 @@ pub(crate) struct Ways {
     pub found: WaysFound,
     /// The first place at which an edge is missing.
     missing: Option<At>,
+    /// Vertices of lines in the ground that do not lie on it, with metres.
+    off: Vec<(f64, At)>,
     /// What meets at each place: of kept ends, kept lines that pass, and lines that are left out.
     meetings: BTreeMap<(u8, At), Meeting>,
 }
@@ -73,6 +79,8 @@ impl Ways {
         if traits.is_in_ground {
             let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
             self.look(&places, &heights, traits.kind, ground);
+            let off = places.iter().zip(&heights).map(|(&at, &height)| (ground.off_m(at, height), at));
+            self.off.extend(off.filter(|(off_m, _)| OFF_MAX_M < *off_m));
         }
         if traits.kind == LineKind::Breakline {
             return;
@@ -126,14 +134,25 @@ impl Ways {
         found.map(|((_, at), _)| *at).collect()
     }
 
-    /// What is wrong, in a sentence.
-    pub fn problem(&self, area: &GamingArea) -> Option<String> {
-        let place = place_text(area, self.missing?);
+    /// What is wrong, in sentences.
+    pub fn problems(&self, area: &GamingArea) -> Vec<String> {
         let WaysFound { pieces_missing, gaps, .. } = self.found;
-        Some(format!(
-            "load modules: {pieces_missing} stretches of lines that are in the ground have no edges there and no other \
-             way covers them, {gaps} of them longer than 30 m, the first {place}"
-        ))
+        let missing = self.missing.map(|at| {
+            format!(
+                "load modules: {pieces_missing} stretches of lines that are in the ground have no edges there and no \
+                 other way covers them, {gaps} of them longer than 30 m, the first {}",
+                place_text(area, at)
+            )
+        });
+        let off = self.off.iter().max_by(|one, other| one.0.total_cmp(&other.0)).map(|(off_m, at)| {
+            format!(
+                "load modules: {} vertices of lines that are in the ground lie more than {OFF_MAX_M} m off it, the \
+                 farthest {off_m:.2} m {}",
+                self.off.len(),
+                place_text(area, *at)
+            )
+        });
+        missing.into_iter().chain(off).collect()
     }
 }
 
@@ -179,6 +198,21 @@ impl<'a> Ground<'a> {
         };
         let of_decks = decks.triangles.iter().map(of_deck).collect();
         Self { square, of_features, of_decks, aside }
+    }
+
+    /// Metres by which a place of a line lies off the ground under it.
+    fn off_m(&self, at: At, height: i32) -> f64 {
+        let off_m = |ground: f64| (ground - f64::from(height)).abs() / f64::from(QUANTA_PER_METRE);
+        if let Some(&there) = self.square.heights.get(&at) {
+            return off_m(there.into());
+        }
+        let under = |triangle: &[u16; 3]| {
+            let corner = |v: &u16| self.square.module.vertices[usize::from(*v)];
+            let corners = triangle.each_ref().map(corner).map(|of| [f64::from(of.x), f64::from(of.y), f64::from(of.z)]);
+            let [y, x] = [at.0 - self.square.reach()[0], at.1 - self.square.reach()[1]].map(|at| at as f64);
+            height_at(&corners, [x, y]).map(off_m)
+        };
+        self.square.module.triangles.iter().filter_map(under).reduce(f64::min).unwrap_or(0.0)
     }
 
     /// Parts of the line between two places with their heights, from 0 to 1, along which neither an edge nor a triangle

@@ -2,9 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::sync::atomic::AtomicBool;
 
+use build::ground::{GamingArea, Ground, Window};
 use features::Kind;
 use load_module_reader::{Area, Block, Keep, LoadedGround, Module, SlmFile};
+use schedule::Workers;
 use store::{AreaLevel, Folder};
 use terrain::Role;
 use terrain::{Dem, LatticePoint, TileFeatures, TileId, Tin, quanta_of_metres};
@@ -91,6 +94,7 @@ impl Drawing {
         let report = self.scene.build("area.tdb", 2).report;
         assert!(report.breaches.is_empty(), "{:?}", report.breaches);
         self.scene.verify_on_dem("area.tdb");
+        check_ground(&self.scene);
         let laid = Laid::open(&self.scene);
         laid.check();
         laid
@@ -110,7 +114,7 @@ pub struct Laid {
 impl Laid {
     pub fn open(scene: &Scene) -> Self {
         let folder = Folder::new(scene.path("area.tdb"));
-        let area = build::ground::GamingArea::new(&scene.job).unwrap();
+        let area = GamingArea::new(&scene.job).unwrap();
         let of = |&tile: &TileId| (folder.read_lines(tile).unwrap().1, folder.read_tile(tile).unwrap().1.tin);
         let read = Area::open(folder.dir(), Keep::InMemory).unwrap();
         let grid = area.grid;
@@ -188,6 +192,26 @@ impl Laid {
                 if line.role == Role::Shore && !is_crossed {
                     assert_eq!(rise, 0.0, "a lake is level");
                 }
+            }
+        }
+    }
+}
+
+/// A post has one ground, whichever window asks: that of a tile, that around a tile, or that of the area.
+#[track_caller]
+pub fn check_ground(scene: &Scene) {
+    let area = GamingArea::new(&scene.job).unwrap();
+    let folder = Folder::new(scene.path("area.tdb"));
+    let ground = Ground::open_built(&scene.job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder).unwrap();
+    let whole = ground.window(area.rect).unwrap();
+    for &tile in &area.tiles {
+        let (own, around) = (ground.tile(&area, tile).unwrap(), ground.around(&area, tile, 5).unwrap());
+        for window in [&*own, &around] {
+            for post in window.dem.rect().posts() {
+                // Voids are filled from whatever window they are read with.
+                let height = |of: &Window| (!of.dem.is_void(post)).then(|| of.dem.height(post));
+                let of = |of: &Window| (height(of), of.importance.weight(post), of.importance.class(post));
+                assert_eq!(of(window), of(&whole), "{post}, by tile {tile} and by the area");
             }
         }
     }

@@ -10,7 +10,7 @@ use std::fs;
 use build::CompileError;
 use build::ground::GroundError;
 
-use super::drawing::{At, Drawn, Laid, geojson, line, polygon};
+use super::drawing::{At, Drawn, Laid, check_ground, geojson, line, polygon};
 use crate::findings::check_limits;
 use crate::product::{Edges, Product};
 use crate::random_jobs::{Seed, ground};
@@ -144,6 +144,7 @@ fn run(seed: u64) -> bool {
     check_limits(&scene.job, &product, &built, Edges::Constrained);
     drop(built);
     scene.verify_on_dem("area.tdb");
+    check_ground(&scene);
     Laid::open(&scene).check();
     drop(scene.build("alone.tdb", 1));
     assert_same(&scene.product("alone.tdb"), &scene.product("area.tdb"), "by one worker and by two");
