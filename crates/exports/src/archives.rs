@@ -32,9 +32,10 @@ pub fn write_3tz<R, E: From<ExportError>>(
 }
 
 /// Files of a folder by name.
-type Files = BTreeMap<String, Vec<u8>>;
+pub(crate) type Files = BTreeMap<String, Vec<u8>>;
 
-fn gathered<R, E>(write: impl FnOnce(&Put) -> Result<R, E>) -> Result<(Files, R), E> {
+/// The files that `write` makes, and what it returns.
+pub(crate) fn gathered<R, E>(write: impl FnOnce(&Put) -> Result<R, E>) -> Result<(Files, R), E> {
     let files = Mutex::new(Files::new());
     let put = |name: &str, bytes: &[u8]| {
         let mut files = files.lock().unwrap_or_else(std::sync::PoisonError::into_inner);

@@ -96,7 +96,7 @@ impl ExportError {
     }
 
     /// A file of this name that could not be written.
-    pub(crate) fn write(name: &str) -> impl Fn(std::io::Error) -> Self {
+    pub fn write(name: &str) -> impl Fn(std::io::Error) -> Self {
         move |source| Self::Write { name: name.to_owned(), source }
     }
 

@@ -1,13 +1,15 @@
 //! About how large an export becomes, before it is written.
 
-use terrain::ModuleRect;
+use terrain::{ModuleId, ModuleRect};
 
 use crate::objects::{Facet, things_in};
 use crate::ribbons::Ribbons;
 use crate::{Carries, ExportError, LEFT_OUT, Product};
 
-/// Load modules whose ribbons and objects are counted: the others have as many on average.
-const COUNTED: usize = 32;
+/// Load modules whose ribbons and objects are counted, at most: the others have as many on average.
+const COUNTED_MAX: usize = 1024;
+/// 2^64 over the golden ratio: multiples of it modulo 2^64 are spread evenly, whatever is counted by them.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// About what an export of meshes takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,9 +32,8 @@ impl Forecast {
             return Ok(None);
         }
         let ground = product.modules.iter().chain(product.coarser.iter().flatten());
-        let ground: usize = ground.map(|module| module.counts().triangles as usize).sum();
-        let levels = 1.0 + product.coarser.len() as f64;
-        let triangles = ground as f64 + levels * above_ground(product);
+        let ground: f64 = ground.map(|module| f64::from(module.counts().triangles)).sum();
+        let triangles = ground + (1.0 + product.coarser.len() as f64) * above_ground(product);
         let texture_bytes = match format.textures {
             LEFT_OUT => 0.0,
             _ => texture_bytes(product, format)?,
@@ -45,17 +46,24 @@ impl Forecast {
 /// Triangles of ribbons and objects of one level.
 fn above_ground(product: &Product) -> f64 {
     let ribbons = Ribbons::of(product).filter(|_| product.has_ribbons);
-    let step = product.rect.count().div_ceil(COUNTED).max(1);
     let triangles = |facets: &[Facet]| -> usize {
         facets.iter().flat_map(|facet| &facet.polygons).map(|polygon| polygon.len().saturating_sub(2)).sum()
     };
-    let (mut counted, mut found) = (0, 0);
-    for id in product.rect.iter().step_by(step) {
-        counted += 1;
-        found += ribbons.as_ref().map_or(0, |ribbons| triangles(&ribbons.in_module(product, id)));
-        found += things_in(product, id).iter().map(|(_, facets)| triangles(facets)).sum::<usize>();
+    let all = product.rect.count();
+    let of = |id| {
+        let of_ribbons = ribbons.as_ref().map_or(0, |ribbons| triangles(&ribbons.in_module(product, id)));
+        of_ribbons + things_in(product, id).iter().map(|(_, facets)| triangles(facets)).sum::<usize>()
+    };
+    if all <= COUNTED_MAX {
+        return product.rect.iter().map(of).sum::<usize>() as f64;
     }
-    found as f64 * product.rect.count() as f64 / f64::from(counted.max(1))
+    let cols = product.rect.cols() as usize;
+    let drawn = (1..=COUNTED_MAX as u64).map(|nth| (u128::from(nth.wrapping_mul(GOLDEN)) * all as u128) >> 64);
+    let ids = drawn.map(|at| ModuleId {
+        row: product.rect.south + (at as usize / cols) as u32,
+        col: product.rect.west + (at as usize % cols) as u32,
+    });
+    ids.map(of).sum::<usize>() as f64 * all as f64 / COUNTED_MAX as f64
 }
 
 /// Bytes of textures, as many for each load module as for that in the middle.

@@ -43,7 +43,6 @@ pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), Exp
             .partition(|(sheet, _)| matches!(sheet, Sheet::Ribbons | Sheet::Objects));
         let block = Block { rect, is_solid: !solid.is_empty(), is_seen: !seen.is_empty() };
         let (name, texture) = (group_name(rect), product.texture(rect, 0.0)?);
-        let put = |name: &str, bytes: &[u8]| put(name, bytes).map_err(ExportError::write(name));
         let library = texture.as_ref().map(|_| format!("{name}.mtl"));
         let library = library.or_else(|| materials.as_ref().map(|_| "classes.mtl".to_owned()));
         for (name, parts) in [(block.solid_name(), &solid), (block.seen_name(), &seen)] {
@@ -61,11 +60,11 @@ pub fn write_gazebo(product: &Product, put: &Put, work: &Work) -> Result<(), Exp
         Ok(Some(block).filter(|block| block.is_solid || block.is_seen))
     })?;
     if let Some(text) = materials {
-        put("meshes/classes.mtl", text.as_bytes()).map_err(ExportError::write("meshes/classes.mtl"))?;
+        put("meshes/classes.mtl", text.as_bytes())?;
     }
     let blocks: Vec<Block> = blocks.into_iter().flatten().collect();
     let text = world(product, &mesh, &blocks)?;
-    put("area.sdf", text.as_bytes()).map_err(ExportError::write("area.sdf"))
+    put("area.sdf", text.as_bytes())
 }
 
 /// A block of load modules, and which meshes it has: one that bodies hit, and one that is seen alone.

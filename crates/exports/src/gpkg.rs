@@ -359,20 +359,14 @@ fn extent(product: &Product, rect: ModuleRect) -> Extent {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
-
     use super::*;
-    use crate::samples;
+    use crate::samples::{self, with_work};
 
     #[test]
     fn decks_are_a_layer_of_their_own_with_a_style() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.gpkg");
-        let (workers, stop) = (Workers::new(1), AtomicBool::new(false));
-        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-        write_gpkg(&path, &samples::with_bridge(), &samples::report(), [8, 8], &work).unwrap();
+        with_work(|work| write_gpkg(&path, &samples::with_bridge(), &samples::report(), [8, 8], work).unwrap());
         let package = Connection::open(&path).unwrap();
         let count = |what: &str| -> i64 { package.query_row(what, [], |row| row.get(0)).unwrap() };
         let counts = ["triangles", "decks", "decks WHERE class = 2", "rtree_decks_geom", "layer_styles"]
@@ -394,9 +388,7 @@ mod tests {
     fn a_package_has_its_layers_with_a_feature_for_each_thing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.gpkg");
-        let (workers, stop) = (Workers::new(1), AtomicBool::new(false));
-        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-        write_gpkg(&path, &samples::product(), &samples::report(), [8, 8], &work).unwrap();
+        with_work(|work| write_gpkg(&path, &samples::product(), &samples::report(), [8, 8], work).unwrap());
         let package = Connection::open(&path).unwrap();
         let count = |layer: &str| -> i64 {
             package.query_row(&format!("SELECT count(*) FROM {layer}"), [], |row| row.get(0)).unwrap()

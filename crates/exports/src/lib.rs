@@ -21,7 +21,7 @@ pub use product::{Block, Levels, Product};
 mod textures;
 pub use textures::{Texture, TextureFile, Textures};
 mod carries;
-pub use carries::{CARRIES, Carries, LEFT_OUT, carries_table, carries_text};
+pub use carries::{CARRIES, Carries, LEFT_OUT, carries_text};
 mod detail;
 mod forecast;
 pub use forecast::Forecast;

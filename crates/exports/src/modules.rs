@@ -48,8 +48,7 @@ pub fn write_modules(product: &Product, put: &Put, work: &Work) -> Result<(), Ex
         let tile = &product.tiles[product.tile_of[index] as usize];
         let coarser = product.coarser.iter().map(|level| level[index].clone());
         let levels = std::iter::once(module.clone()).chain(coarser);
-        let name = file_name(module.id, "slm");
-        put(&name, &file_of(tile, levels.collect())).map_err(ExportError::write(&name))
+        put(&file_name(module.id, "slm"), &file_of(tile, levels.collect()))
     })?;
     Ok(())
 }

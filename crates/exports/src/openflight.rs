@@ -44,11 +44,9 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
             records.texture(&texture_name);
         }
         put_square(&mut records, &details, rect, texture.as_ref());
-        let name = format!("squares/{}", square_name(product, rect, "flt"));
-        put(&name, &records.into_bytes()).map_err(ExportError::write(&name))?;
+        put(&format!("squares/{}", square_name(product, rect, "flt")), &records.into_bytes())?;
         let Some(texture) = texture else { return Ok(()) };
-        let name = format!("squares/{texture_name}");
-        put(&name, &texture.bytes).map_err(ExportError::write(&name))
+        put(&format!("squares/{texture_name}"), &texture.bytes)
     })?;
     let mut records = Records::default();
     records.header(&place(product, &earth, product.rect)?);
@@ -61,9 +59,9 @@ pub fn write_openflight(product: &Product, put: &Put, work: &Work) -> Result<(),
     }
     records.pop();
     records.pop();
-    put("area.flt", &records.into_bytes()).map_err(ExportError::write("area.flt"))?;
+    put("area.flt", &records.into_bytes())?;
     let index = metaflight(product, &grid(product), &place(product, &earth, product.rect)?);
-    put("area.mft", index.as_bytes()).map_err(ExportError::write("area.mft"))
+    put("area.mft", index.as_bytes())
 }
 
 /// Palettes and nodes of a square: a node for each level where there are several, in it one for each sheet.

@@ -1,7 +1,6 @@
 //! A small product for the tests of this crate: two load modules side by side, in an area of two.
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
 
 use schedule::Workers;
@@ -14,17 +13,12 @@ use terrain::{
     ModuleId, ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, ObjectKind, Prism, Spacing, TileId,
 };
 
+use crate::archives::gathered;
 use crate::{ExportError, Product, Put, Work};
 
 /// The files of an export that writes a folder.
 pub(crate) fn files<T>(write: impl FnOnce(&Put, &Work) -> Result<T, ExportError>) -> BTreeMap<String, Vec<u8>> {
-    let files = Mutex::new(BTreeMap::new());
-    let put = |name: &str, bytes: &[u8]| {
-        files.lock().unwrap().insert(name.to_owned(), bytes.to_vec());
-        Ok(())
-    };
-    with_work(|work| drop(write(&put, work).unwrap()));
-    files.into_inner().unwrap()
+    with_work(|work| gathered(|put| write(put, work))).unwrap().0
 }
 
 /// The same as text.

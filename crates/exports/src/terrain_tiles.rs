@@ -35,7 +35,6 @@ pub fn write_3dtiles_terrain(
     put: &Put,
     work: &Work,
 ) -> Result<Datum, ExportError> {
-    let put = |name: &str, bytes: &[u8]| put(name, bytes).map_err(ExportError::write(name));
     let terrain = QuantizedMesh::of(product, assumed, work)?;
     let mut all = BTreeMap::new();
     for (what, tiles) in terrain.tiles() {

@@ -17,7 +17,8 @@ struct Found {
     triangles: Vec<[[f64; 3]; 3]>,
 }
 
-fn document(bytes: &[u8]) -> (Value, &[u8]) {
+/// The document of a binary glTF, and its numbers.
+pub(crate) fn document(bytes: &[u8]) -> (Value, &[u8]) {
     let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
     let json = word(12);
     (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), &bytes[28 + json..])

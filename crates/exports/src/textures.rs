@@ -1,6 +1,5 @@
 //! Textures from orthophotos: one for each unit that a program loads, seen straight from above.
 
-use std::error::Error;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -182,23 +181,34 @@ impl Textures {
 
 /// The file of a picture, row by row from the north.
 fn encoded(file: TextureFile, colors: &[u8], [wide, high]: [usize; 2]) -> Result<Vec<u8>, ExportError> {
-    let fault = |error: Box<dyn Error + Send + Sync>| ExportError::write("texture")(std::io::Error::other(error));
-    let mut bytes = Vec::new();
     match file {
         TextureFile::Jpeg => {
+            let mut bytes = Vec::new();
             let encoder = jpeg_encoder::Encoder::new(&mut bytes, QUALITY);
             let made = encoder.encode(colors, wide as u16, high as u16, jpeg_encoder::ColorType::Rgb);
-            made.map_err(|error| fault(error.into()))?;
+            made.map_err(|error| ExportError::write("texture")(std::io::Error::other(error)))?;
+            Ok(bytes)
         }
-        TextureFile::Png => {
-            let mut encoder = png::Encoder::new(&mut bytes, wide as u32, high as u32);
-            encoder.set_color(png::ColorType::Rgb);
-            let mut writer = encoder.write_header().map_err(|error| fault(error.into()))?;
-            writer.write_image_data(colors).map_err(|error| fault(error.into()))?;
-            writer.finish().map_err(|error| fault(error.into()))?;
-        }
-        TextureFile::Rgb => bytes = sgi(colors, [wide, high]),
+        TextureFile::Png => png_of([wide, high], colors, |encoder| encoder.set_color(png::ColorType::Rgb)),
+        TextureFile::Rgb => Ok(sgi(colors, [wide, high])),
     }
+}
+
+/// The file of a picture of samples, row by row from the north; `set` says which these are.
+pub(crate) fn png_of(
+    [wide, high]: [usize; 2],
+    samples: &[u8],
+    set: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>),
+) -> Result<Vec<u8>, ExportError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, wide as u32, high as u32);
+    set(&mut encoder);
+    let write = || {
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(samples)?;
+        writer.finish()
+    };
+    write().map_err(|error| ExportError::write("picture")(error.into()))?;
     Ok(bytes)
 }
 

@@ -37,7 +37,6 @@ pub fn write_3dtiles(product: &Product, assumed: Option<Datum>, put: &Put, work:
 /// The same of a product that is set on the globe.
 pub(crate) fn write_on(product: &Product, earth: Earth, put: &Put, work: &Work) -> Result<Datum, ExportError> {
     let layers = Layers::of(product, earth, work)?;
-    let put = |name: &str, bytes: &[u8]| put(name, bytes).map_err(ExportError::write(name));
     let tileset = layers.tileset(work, |rect| layers.square(rect, &|name, made| put(name, &made())))?;
     put("tileset.json", tileset.as_bytes())?;
     Ok(layers.earth.datum())
@@ -326,9 +325,6 @@ fn box_around(places: impl Iterator<Item = [f64; 3]>) -> [f64; 12] {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
 
     use super::*;
     use crate::samples;
@@ -345,9 +341,7 @@ mod tests {
     #[test]
     fn a_file_asked_for_alone_is_that_of_the_export() {
         for product in [samples::product(), samples::with_hole(), samples::with_levels(), samples::with_bridge()] {
-            let (workers, stop) = (Workers::new(2), AtomicBool::new(false));
-            let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
-            let tileset = Tileset::of(&product, None, &work).unwrap();
+            let tileset = samples::with_work(|work| Tileset::of(&product, None, work).unwrap());
             for (name, bytes) in written(&product) {
                 assert!(tileset.file(&name).unwrap() == Some(bytes), "{name}");
             }
@@ -404,8 +398,7 @@ mod tests {
     fn decks_are_nodes_of_groups_and_their_boxes_hold_them() {
         let files = written(&samples::with_bridge());
         let file = &files["groups/r0000c0000_r0000c0001.glb"];
-        let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
-        let document: Value = serde_json::from_slice(&file[20..20 + length]).unwrap();
+        let (document, _) = crate::tests::document(file);
         let names: Vec<&str> =
             document["nodes"].as_array().unwrap().iter().map(|node| node["name"].as_str().unwrap()).collect();
         assert_eq!(names, ["r0000c0000_r0000c0001", "decks_r0000c0000_r0000c0001", "decks"]);

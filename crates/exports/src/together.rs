@@ -98,7 +98,8 @@ impl Together {
         let index = Mutex::new(Value::Null);
         let put = |name: &str, bytes: &[u8]| {
             if name == "tileset.json" {
-                *index.lock().unwrap_or_else(PoisonError::into_inner) = serde_json::from_slice(bytes)?;
+                let read = serde_json::from_slice(bytes).map_err(|error| ExportError::write(name)(error.into()))?;
+                *index.lock().unwrap_or_else(PoisonError::into_inner) = read;
             }
             self.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
             put(&format!("{folder}/{name}"), bytes)
@@ -137,7 +138,7 @@ impl Together {
             },
         });
         let text = index.to_string();
-        put("tileset.json", text.as_bytes()).map_err(ExportError::write("tileset.json"))?;
+        put("tileset.json", text.as_bytes())?;
         Ok(self.bytes.into_inner() + text.len() as u64)
     }
 

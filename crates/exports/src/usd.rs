@@ -27,14 +27,13 @@ pub fn write_usd(product: &Product, put: &Put, work: &Work) -> Result<(), Export
         for detail in &details {
             let name = tile.file(detail.product.level, product);
             let text = tile_text(detail, tile, texture.as_ref());
-            put(&name, text.as_bytes()).map_err(ExportError::write(&name))?;
+            put(&name, text.as_bytes())?;
         }
         let Some(texture) = texture else { return Ok(()) };
-        let name = format!("tiles/{}.{}", tile.name, product.texture_extension());
-        put(&name, &texture.bytes).map_err(ExportError::write(&name))
+        put(&format!("tiles/{}.{}", tile.name, product.texture_extension()), &texture.bytes)
     })?;
     let levels = details.iter().map(|detail| &detail.product).collect::<Vec<_>>();
-    put("area.usda", area_text(&levels, &tiles).as_bytes()).map_err(ExportError::write("area.usda"))
+    put("area.usda", area_text(&levels, &tiles).as_bytes())
 }
 
 /// The part of a tile that is exported.

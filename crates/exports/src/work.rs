@@ -1,6 +1,5 @@
 //! What every export needs to work: workers, a flag to stop, someone to tell how far it is.
 
-use std::io;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use schedule::{Workers, for_each_independent};
@@ -8,7 +7,7 @@ use schedule::{Workers, for_each_independent};
 use crate::ExportError;
 
 /// Takes one file of an export: its path inside the export, with `/` between folders, and its bytes.
-pub type Put<'a> = dyn Fn(&str, &[u8]) -> io::Result<()> + Sync + 'a;
+pub type Put<'a> = dyn Fn(&str, &[u8]) -> Result<(), ExportError> + Sync + 'a;
 
 /// How far an export is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,7 +15,7 @@ use terrain::HOLE_CLASS;
 
 use crate::classes::HOLE_NAME;
 use crate::sheets::Material;
-use crate::{ExportError, Product, Put, Sheet, Work};
+use crate::{ExportError, Product, Put, Sheet, Work, textures};
 pub use engine::Engine;
 use placements::placements;
 use samples::{Off, Samples};
@@ -49,8 +49,8 @@ pub fn write_heightmap(
         for number in layout.numbers() {
             let name = layer_file(product, layer, number);
             let weights = layout.tile(number, true, |at| if samples.classes[at] == layer.class { u8::MAX } else { 0 });
-            let bytes = png_of(layout.size, png::BitDepth::Eight, &weights).map_err(ExportError::write(&name))?;
-            put(&name, &bytes).map_err(ExportError::write(&name))?;
+            let bytes = png_of(layout.size, png::BitDepth::Eight, &weights)?;
+            put(&name, &bytes)?;
         }
         Ok(())
     })?;
@@ -61,9 +61,9 @@ pub fn write_heightmap(
     }
     if let Some(text) = placements(product, engine) {
         about["objects"] = placements::told(engine);
-        put(placements::FILE, text.as_bytes()).map_err(ExportError::write(placements::FILE))?;
+        put(placements::FILE, text.as_bytes())?;
     }
-    put("heightmap.json", format!("{about:#}\n").as_bytes()).map_err(ExportError::write("heightmap.json"))
+    put("heightmap.json", format!("{about:#}\n").as_bytes())
 }
 
 /// How the area is divided into tiles and samples.
@@ -125,11 +125,11 @@ fn write_tile(
     let bytes: Vec<u8> = match layout.engine {
         Engine::Unreal => {
             let big_endian: Vec<u8> = heights.iter().flat_map(|height| height.to_be_bytes()).collect();
-            png_of(layout.size, png::BitDepth::Sixteen, &big_endian).map_err(ExportError::write(&name))?
+            png_of(layout.size, png::BitDepth::Sixteen, &big_endian)?
         }
         Engine::Unity => heights.iter().flat_map(|height| height.to_le_bytes()).collect(),
     };
-    put(&name, &bytes).map_err(ExportError::write(&name))?;
+    put(&name, &bytes)?;
     Ok(name)
 }
 
@@ -167,16 +167,13 @@ fn weights_told(product: &Product, layout: &Layout, layers: &[Layer]) -> Value {
     })
 }
 
-fn png_of(size: usize, depth: png::BitDepth, samples: &[u8]) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, size as u32, size as u32);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_depth(depth);
-    encoder.set_compression(png::Compression::Fast);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(samples)?;
-    writer.finish()?;
-    Ok(bytes)
+/// The file of a tile of grey samples.
+fn png_of(size: usize, depth: png::BitDepth, samples: &[u8]) -> Result<Vec<u8>, ExportError> {
+    textures::png_of([size; 2], samples, |encoder| {
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.set_depth(depth);
+        encoder.set_compression(png::Compression::Fast);
+    })
 }
 
 /// The name of a file of an area, where files of engines have only letters, digits, hyphens and underscores.
@@ -255,13 +252,9 @@ fn about(product: &Product, layout: &Layout, samples: &Samples, off: Off) -> Val
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-    use std::sync::atomic::AtomicBool;
-
-    use schedule::Workers;
-
     use super::*;
     use crate::samples;
+    use std::collections::BTreeMap;
 
     fn files(product: &Product, engine: Engine, size: Option<usize>) -> BTreeMap<String, Vec<u8>> {
         samples::files(|put, work| write_heightmap(product, engine, size, put, work))
@@ -354,10 +347,9 @@ mod tests {
 
     #[test]
     fn a_size_that_the_engine_does_not_take_is_refused_with_those_it_takes() {
-        let (workers, stop) = (Workers::new(1), AtomicBool::new(false));
-        let work = Work { workers: &workers, stop: &stop, tell: &|_| {} };
         let put = |_: &str, _: &[u8]| Ok(());
-        let error = write_heightmap(&samples::product(), Engine::Unity, Some(100), &put, &work).unwrap_err();
+        let write = |work: &Work| write_heightmap(&samples::product(), Engine::Unity, Some(100), &put, work);
+        let error = samples::with_work(write).unwrap_err();
         assert!(error.to_string().contains("found 100 samples, expected one of 33, 65"), "{error}");
     }
 

@@ -55,13 +55,12 @@ pub fn write_quantized_mesh(
     let terrain = QuantizedMesh::of(product, assumed, work)?;
     for (what, tiles) in terrain.tiles() {
         work.each(what, &tiles, |&(level, col, row)| {
-            let name = format!("{level}/{col}/{row}.terrain");
-            put(&name, &terrain.made(level, col, row)).map_err(ExportError::write(&name))
+            put(&format!("{level}/{col}/{row}.terrain"), &terrain.made(level, col, row))
         })?;
     }
     for name in ["holes.geojson", "layer.json"] {
         if let Some(text) = terrain.file(name) {
-            put(name, &text).map_err(ExportError::write(name))?;
+            put(name, &text)?;
         }
     }
     Ok(terrain.earth.datum())

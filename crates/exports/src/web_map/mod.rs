@@ -16,6 +16,7 @@ use terrain::HOLE_CLASS;
 
 use crate::earth::Earth;
 use crate::mbtiles::write_tables;
+use crate::textures::png_of;
 use crate::triangle_index::TriangleIndex;
 use crate::{Datum, ExportError, Product, Work};
 pub use encoding::HeightEncoding;
@@ -134,7 +135,7 @@ impl<'a> Pyramid<'a> {
         squares.sort_by_key(|&square| coord(square).map_or(u64::MAX, |coord| TileId::from(coord).value()));
         let made = work.each("tiles", &squares, |&square| {
             let Some(colors) = self.colors(square) else { return Ok(None) };
-            let bytes = png_of(self.map.pixels as u32, &colors).map_err(ExportError::write("a tile"))?;
+            let bytes = png_of([self.map.pixels; 2], &colors, |encoder| encoder.set_color(png::ColorType::Rgb))?;
             Ok(Some((square, bytes)))
         })?;
         Ok(made.into_iter().flatten().collect())
@@ -209,17 +210,6 @@ impl<'a> Pyramid<'a> {
 
 fn coord(square: Square) -> PmtResult<TileCoord> {
     TileCoord::new(square.level as u8, square.col, square.row)
-}
-
-fn png_of(pixels: u32, colors: &[u8]) -> std::io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, pixels, pixels);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(colors)?;
-    writer.finish()?;
-    Ok(bytes)
 }
 
 #[cfg(test)]

@@ -295,7 +295,7 @@ fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     }
     let mut said = write_globe_file(arguments, &product, work)?;
     if let Some(folder) = folder {
-        let put = |name: &str, bytes: &[u8]| folder.put(name, bytes);
+        let put = |name: &str, bytes: &[u8]| folder.put(name, bytes).map_err(ExportError::write(name));
         match arguments.format {
             Format::Openflight => exports::write_openflight(&product, &put, work)?,
             Format::Tiles3d => said = Some(exports::write_3dtiles(&product, arguments.assume_datum, &put, work)?),

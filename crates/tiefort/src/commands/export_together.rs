@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use exports::{Covered, Datum, Product, Put, Together, Work};
+use exports::{Covered, Datum, ExportError, Product, Put, Together, Work};
 use store::Folder;
 use views::grouped;
 
@@ -55,7 +55,8 @@ impl Several<'_> {
         let together = Together::of(named, self.assumed)?;
         if self.format == Format::Tiles3d {
             let folder = NewFolder::begin(self.out)?;
-            let told = self.write(together, &|name, bytes| folder.put(name, bytes), work)?;
+            let put = |name: &str, bytes: &[u8]| folder.put(name, bytes).map_err(ExportError::write(name));
+            let told = self.write(together, &put, work)?;
             folder.finish()?;
             return Ok(told);
         }
