@@ -44,6 +44,9 @@ const NAMES: [(&str, &str, Option<bool>); 17] = [
     ("water", "lake", Some(true)),
 ];
 
+/// Parts of names that suggest other things: lines of several kinds, which only their attributes tell apart.
+const OTHERS: [&str; 4] = ["shore", "coast", "border", "boundar"];
+
 /// Looks at files of features, each layer of a GeoPackage alone.
 ///
 /// # Errors
@@ -92,12 +95,16 @@ fn names(path: &Path, layer: Option<&str>) -> impl Iterator<Item = String> {
     layer.map(str::to_lowercase).into_iter().chain(file)
 }
 
-/// The kind that the name of a layer suggests, or else that of its file.
+/// The kind that the name of a layer suggests, or else that of its file; none where that names ways and waters, or what
+/// is neither.
 fn kind_by_name(path: &Path, layer: Option<&str>, seen: &FeaturesSeen) -> Option<&'static str> {
     let fits = |shape: Option<bool>| shape.is_none() || seen.are_polygons == shape;
     let of = |name: String| {
-        let found = NAMES.iter().find(|(part, _, shape)| name.contains(part) && fits(*shape));
-        found.map(|(_, kind, _)| *kind)
+        let found =
+            || NAMES.iter().filter(|(part, _, shape)| name.contains(part) && fits(*shape)).map(|(_, kind, _)| *kind);
+        let is_water = |kind: &str| ["stream", "river", "lake"].contains(&kind);
+        let is_mixed = found().any(is_water) && !found().all(is_water) || OTHERS.iter().any(|part| name.contains(part));
+        found().next().filter(|_| !is_mixed)
     };
     names(path, layer).filter_map(of).next()
 }
@@ -124,6 +131,9 @@ mod tests {
         check("roads.gpkg", Some("a"), None, None);
         check("streams.geojson", None, Some(false), Some("stream"));
         check("data.geojson", None, Some(false), None);
+        check("shores_rivers.geojson", None, Some(false), None);
+        check("roads_rivers.geojson", None, Some(false), None);
+        check("rivers_streams.geojson", None, Some(false), Some("stream"));
     }
 
     #[test]
