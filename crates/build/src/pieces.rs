@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use crate::ground::{GamingArea, slope_reach, waterside_reach};
+use crate::ground::{GamingArea, roadside_reach, waterside_reach};
 use features::{
     Cost, Earthworks, Face, FeatureId, Formed, FormedEdge, Levelled, Limit, Middle, Place, Remark, Reserved, Role,
     Surface, Traits, Why,
@@ -13,7 +13,7 @@ use store::{
 };
 use terrain::{
     FeatureSurface, Features, LATTICE_PER_POST, LatticePoint, LineTraits, ModuleGrid, ModuleId, PostRect, Side,
-    SideSpan, SurfaceGround, TileFeatures, TileId, Vertex, Waterside, WayLine,
+    SideSlope, SideSpan, SurfaceGround, TileFeatures, TileId, Vertex, WayLine,
 };
 use tin::load_modules::{Layout, cut_decks};
 use tin::tiling::{outer_border_posts, outer_sides};
@@ -35,8 +35,9 @@ pub(crate) fn pieces(run: &Run, features: &features::AreaFeatures, levelled: &Le
     cutting.surfaces(&formed.surfaces, true, &whole);
     cutting.surfaces(&formed.shaped, false, &BTreeSet::new());
     cutting.decks(&formed.decks);
-    cutting.slopes(formed);
-    cutting.watersides(&levelled.watersides);
+    let spacing = run.area.frame.spacing;
+    cutting.slopes(&levelled.roadsides, roadside_reach(spacing), |features| &mut features.slopes);
+    cutting.slopes(&levelled.watersides, waterside_reach(spacing), |features| &mut features.watersides);
     cutting.lines(&formed.middles, &features.traits_by_id());
     let Cutting { area, pieces, .. } = cutting;
     pieces
@@ -235,25 +236,12 @@ impl Cutting<'_> {
         }
     }
 
-    /// Edges and centrelines of roads, for all tiles into which their slopes may reach.
-    fn slopes(&mut self, formed: &Formed) {
-        let reach = (slope_reach(self.area.frame.spacing) + 1) * self.steps;
-        let held = formed.edges.iter().filter(|edge| matches!(edge.role, Role::Side | Role::Centre));
-        let held = held.map(|edge| [edge.a, edge.b].map(|point| formed.points[point as usize]));
-        for ends in held.chain(formed.shaped_slopes.iter().copied()) {
-            for index in self.touching(ends.into_iter().map(|(place, _)| place), reach) {
-                self.pieces[index].features.slopes.push(ends.map(vertex));
-            }
-        }
-    }
-
-    /// Pieces of water, for all tiles into which the slopes beside them may reach.
-    fn watersides(&mut self, watersides: &[Waterside]) {
-        let reach = (waterside_reach(self.area.frame.spacing) + 1) * self.steps;
-        for waterside in watersides {
-            let places = waterside.ends.map(|end| Place::new(end.at.row, end.at.col));
-            for index in self.touching(places.into_iter(), reach) {
-                self.pieces[index].features.watersides.push(*waterside);
+    /// Edges of roads or pieces of water, for all tiles into which slopes may reach that go so many posts far.
+    fn slopes(&mut self, slopes: &[SideSlope], posts: i32, of: fn(&mut TileFeatures) -> &mut Vec<SideSlope>) {
+        for slope in slopes {
+            let places = slope.ends.map(|end| Place::new(end.at.row, end.at.col));
+            for index in self.touching(places.into_iter(), (posts + 1) * self.steps) {
+                of(&mut self.pieces[index].features).push(*slope);
             }
         }
     }

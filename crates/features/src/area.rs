@@ -3,12 +3,13 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-use terrain::{Each, QUANTA_PER_METRE, Waterside};
+use terrain::{Each, QUANTA_PER_METRE, SideSlope};
 
 use crate::aground::{Beside, still_under, tell_of_hills, uncut, under_hills};
 use crate::earthworks::{Laid, earthworks};
 use crate::objects::{Plan, strips};
 use crate::pieces::moved;
+use crate::roadsides::roadsides;
 use crate::rules::Sorted;
 use crate::watersides::{Watersides, watersides};
 use crate::{
@@ -63,7 +64,9 @@ pub struct Levelled {
     /// What they move.
     pub earthworks: Earthworks,
     /// Water that lies off the natural ground, in the TIN or not.
-    pub watersides: Vec<Waterside>,
+    pub watersides: Vec<SideSlope>,
+    /// Edges of roads, in the TIN or not, with the ground that water leaves.
+    pub roadsides: Vec<SideSlope>,
     /// Quanta of bridges that would run through hills, and became tunnels.
     pub through_hills: i64,
 }
@@ -258,7 +261,7 @@ impl AreaFeatures {
         // What lies beyond the area is counted, not listed.
         remarks.retain(|remark| remark.flaw != Flaw::Outside);
         Remark::sort(&mut remarks);
-        let width = |id: FeatureId| kinds.get(&id).map_or(0, |traits| traits.width);
+        let roadsides = roadsides(&reserved.formed, &graded, (&resting, &self.road_sides));
         let earthworks = earthworks(&Laid {
             ground: &natural,
             site: &self.site,
@@ -266,14 +269,14 @@ impl AreaFeatures {
             pins: &pins,
             afloat: &afloat,
             strands: &strands,
-            width: &width,
+            width: &|id| kinds.get(&id).map_or(0, |traits| traits.width),
             level: &level,
             outlines: &self.outlines,
             lakes: &lakes,
             inside,
             limits: (options, falls),
         });
-        Levelled { reserved, remarks, earthworks, watersides, through_hills }
+        Levelled { reserved, remarks, earthworks, watersides, roadsides, through_hills }
     }
 
     /// Rivers, lakes and what else polygons of water became, by the ground inside the area and that nearest to places

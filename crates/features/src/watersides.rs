@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use terrain::{LatticePoint, QUANTA_PER_METRE, Role, Vertex, Waterside};
+use terrain::{LatticePoint, QUANTA_PER_METRE, Role, SideSlope, Vertex};
 
 use crate::{Place, Strand};
 
@@ -21,13 +21,13 @@ const CELL_M: f64 = 32.0;
 const BANK_RUN: f64 = 2.0;
 
 /// Pieces of channels, shores and banks that lie off the natural ground at one of their ends at least.
-pub(crate) fn watersides(strands: &[Strand], ground: &dyn Fn(Place) -> Option<i32>) -> Vec<Waterside> {
+pub(crate) fn watersides(strands: &[Strand], ground: &dyn Fn(Place) -> Option<i32>) -> Vec<SideSlope> {
     let is_water = |strand: &&Strand| matches!(strand.role, Role::Channel | Role::Shore | Role::Bank);
     let pieces = strands.iter().filter(is_water).flat_map(|strand| strand.stations.windows(2));
     let waterside = |pair: &[(Place, i32)]| {
         let ends = [pair[0], pair[1]].map(|(place, height)| Vertex { at: place.into(), height });
         let ground = [ground(pair[0].0)?, ground(pair[1].0)?];
-        (ends.map(|end| end.height) != ground).then_some(Waterside { ends, ground })
+        (ends.map(|end| end.height) != ground).then_some(SideSlope { ends, ground })
     };
     pieces.filter_map(waterside).collect()
 }
@@ -36,14 +36,14 @@ pub(crate) fn watersides(strands: &[Strand], ground: &dyn Fn(Place) -> Option<i3
 pub struct Watersides<'a> {
     metres_per_step: f64,
     side: i32,
-    cells: HashMap<(i32, i32), Vec<&'a Waterside>>,
+    cells: HashMap<(i32, i32), Vec<&'a SideSlope>>,
 }
 
 impl<'a> Watersides<'a> {
     /// Of pieces on a lattice with so many metres a step.
-    pub fn of(pieces: &'a [Waterside], metres_per_step: f64) -> Self {
+    pub fn of(pieces: &'a [SideSlope], metres_per_step: f64) -> Self {
         let side = (CELL_M / metres_per_step).ceil() as i32;
-        let mut cells: HashMap<(i32, i32), Vec<&Waterside>> = HashMap::new();
+        let mut cells: HashMap<(i32, i32), Vec<&SideSlope>> = HashMap::new();
         for piece in pieces {
             let run = offs(piece).map(run_of).into_iter().fold(0.0, f64::max);
             let reach = (run / f64::from(QUANTA_PER_METRE) / metres_per_step).ceil() as i32;
@@ -68,22 +68,27 @@ impl<'a> Watersides<'a> {
     }
 
     /// By how many quanta a piece moves the ground at a place, upwards.
-    fn moved(&self, piece: &Waterside, at: LatticePoint, natural: f64) -> f64 {
+    fn moved(&self, piece: &SideSlope, at: LatticePoint, natural: f64) -> f64 {
         let (steps, share) = nearest_on(piece.ends, at);
         let along = |[a, b]: [f64; 2]| a + share * (b - a);
         let (water, off) = (along(piece.ends.map(|end| f64::from(end.height))), along(offs(piece)));
-        let (run, away) = (run_of(off), steps * self.metres_per_step * f64::from(QUANTA_PER_METRE));
-        if run <= away {
-            return 0.0;
-        }
-        let (far, up) = (off.abs(), off.signum());
-        let to_slope = (natural - water) * up - far * away / run;
-        -up * to_slope.min(far * (1.0 - away / run)).max(0.0)
+        moved_beside([water, off], [run_of(off), steps * self.metres_per_step * f64::from(QUANTA_PER_METRE)], natural)
     }
 }
 
-/// Quanta by which the natural ground lies above the water at both ends.
-fn offs(piece: &Waterside) -> [f64; 2] {
+/// By how many quanta ground of which the DEM says `natural` is moved upwards, so far `away` from an edge at some
+/// height, above which the DEM lies by `off` there; the slope ends after `run`; all in quanta.
+pub(crate) fn moved_beside([height, off]: [f64; 2], [run, away]: [f64; 2], natural: f64) -> f64 {
+    if run <= away {
+        return 0.0;
+    }
+    let (far, up) = (off.abs(), off.signum());
+    let to_slope = (natural - height) * up - far * away / run;
+    -up * to_slope.min(far * (1.0 - away / run)).max(0.0)
+}
+
+/// Quanta by which the natural ground lies above both ends of an edge.
+pub fn offs(piece: &SideSlope) -> [f64; 2] {
     [0, 1].map(|end| f64::from(piece.ground[end] - piece.ends[end].height))
 }
 
@@ -109,7 +114,7 @@ mod tests {
     /// A stream along row 0 with steps of a metre: the ground every 10 m away from it.
     fn beside_stream(height: i32, known: i32, natural: impl Fn(i32) -> i32) -> Vec<i32> {
         let ends = [-200, 400].map(|col| Vertex { at: LatticePoint::new(0, col), height });
-        let pieces = [Waterside { ends, ground: [known; 2] }];
+        let pieces = [SideSlope { ends, ground: [known; 2] }];
         let all = Watersides::of(&pieces, 1.0);
         (0..20).map(|at| all.ground(LatticePoint::new(10 * at, 100), natural(at))).collect()
     }

@@ -35,8 +35,8 @@ mod tests {
     use super::*;
     use crate::samples;
     use terrain::{
-        FeatureSurface, Features, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, Side, SideSpan,
-        SurfaceGround, Vertex, Waterside, WayLine,
+        FeatureSurface, Features, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, Side, SideSlope, SideSpan,
+        SurfaceGround, Vertex, WayLine,
     };
 
     #[test]
@@ -55,8 +55,8 @@ mod tests {
             },
             surfaces: SurfaceGround::ALL.map(surface).to_vec(),
             shaped: vec![surface(SurfaceGround::Lake)],
-            slopes: vec![[vertices[0], vertices[1]]],
-            watersides: vec![Waterside { ends: [vertices[1], vertices[2]], ground: [5, -6] }],
+            slopes: vec![SideSlope { ends: [vertices[0], vertices[1]], ground: [7, 8] }],
+            watersides: vec![SideSlope { ends: [vertices[1], vertices[2]], ground: [5, -6] }],
             decks: vec![surface(SurfaceGround::Road)],
             lines: vec![WayLine {
                 class: 4,

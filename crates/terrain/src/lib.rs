@@ -22,7 +22,7 @@ pub use tin::{POINT_COST, Tin, TinFault, Vertex};
 mod features;
 pub use features::{FEATURE_STEPS_MAX, Features, SideSpan};
 mod tile_features;
-pub use tile_features::{FeatureSurface, SurfaceGround, TileFeatures, Waterside, WayLine};
+pub use tile_features::{FeatureSurface, SideSlope, SurfaceGround, TileFeatures, WayLine};
 mod earthwork;
 pub use earthwork::{Earthwork, OffCause, Role};
 mod tile;

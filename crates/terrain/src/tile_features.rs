@@ -18,19 +18,19 @@ pub struct TileFeatures {
     /// Ground that features shape without being in the TIN, of all that touches the tile: where they had no room.
     pub shaped: Vec<FeatureSurface>,
     /// Edges of roads within reach of the tile, beside which the ground slopes to the natural one.
-    pub slopes: Vec<[Vertex; 2]>,
+    pub slopes: Vec<SideSlope>,
     /// Pieces of water within reach of the tile, beside which the ground slopes to it.
-    pub watersides: Vec<Waterside>,
+    pub watersides: Vec<SideSlope>,
     /// Bridges: polygons above the ground, of all that touch the tile. Their rings are simple.
     pub decks: Vec<FeatureSurface>,
     /// Middle lines of all ways that touch the tile, in the ground or not; they change nothing in it.
     pub lines: Vec<WayLine>,
 }
 
-/// A piece of a channel, shore or bank from one station to the next.
+/// A piece of an edge of a road, or of a channel, shore or bank, from which the ground slopes to the natural one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Waterside {
-    /// Its ends, at the heights of the water.
+pub struct SideSlope {
+    /// Its ends, at the heights of the road or the water.
     pub ends: [Vertex; 2],
     /// Heights of the natural ground there, in quanta.
     pub ground: [i32; 2],

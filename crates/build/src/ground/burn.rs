@@ -6,18 +6,15 @@
 
 use std::collections::HashMap;
 
-use features::{CUT_RUN, FILL_RUN, WATERSIDE_REACH_M, Watersides, height_in, nearest_on};
-use terrain::{Dem, Importance, LatticePoint, Post, PostRect, SurfaceGround, TileFeatures};
+use features::{ROADSIDE_REACH_M, WATERSIDE_REACH_M, Watersides, height_in, moved_by_road, nearest_on, offs};
+use terrain::{Dem, Importance, LatticePoint, Post, PostRect, QUANTA_PER_METRE, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
 use crate::ground::window::Window;
 
-/// Metres from the edge of a road beyond which no slope reaches.
-pub const SLOPE_REACH_M: f64 = 60.0;
-
 /// Posts from the edge of a road within which slopes may reach.
-pub fn slope_reach(spacing: Spacing) -> i32 {
-    (SLOPE_REACH_M / spacing.metres()).ceil() as i32
+pub fn roadside_reach(spacing: Spacing) -> i32 {
+    (ROADSIDE_REACH_M / spacing.metres()).ceil() as i32
 }
 
 /// Posts from water within which slopes may reach.
@@ -107,24 +104,23 @@ impl<'a> Burning<'a> {
 
     /// Lowers and lifts the ground beside roads, each post by the edge nearest to it.
     fn slopes(&mut self) {
-        let reach = slope_reach(self.spacing);
-        let mut nearest: HashMap<usize, (f64, f64)> = HashMap::new();
-        for &[a, b] in &self.features.slopes {
-            for post in self.posts_near(&[a, b], reach) {
-                let (steps, share) = nearest_on([a, b], self.place(post));
-                let height = f64::from(a.height) + share * f64::from(b.height - a.height);
-                let metres = steps * self.spacing.metres() / f64::from(self.steps);
-                let known = nearest.entry(self.rect.index(post)).or_insert((f64::INFINITY, 0.0));
-                if metres < known.0 || (metres == known.0 && height < known.1) {
-                    *known = (metres, height);
+        let reach = roadside_reach(self.spacing);
+        let quanta_per_step = self.spacing.metres() / f64::from(self.steps) * f64::from(QUANTA_PER_METRE);
+        let mut nearest: HashMap<usize, (f64, [f64; 2])> = HashMap::new();
+        for slope in &self.features.slopes {
+            for post in self.posts_near(&slope.ends, reach) {
+                let (steps, share) = nearest_on(slope.ends, self.place(post));
+                let along = |[a, b]: [f64; 2]| a + share * (b - a);
+                let edge = [slope.ends.map(|end| f64::from(end.height)), offs(slope)].map(along);
+                let known = nearest.entry(self.rect.index(post)).or_insert((f64::INFINITY, edge));
+                if (steps, edge) < *known {
+                    *known = (steps, edge);
                 }
             }
         }
-        for (index, (metres, height)) in nearest {
-            let Some(ground) = self.heights[index].filter(|_| metres <= SLOPE_REACH_M) else { continue };
-            let run = metres * f64::from(terrain::QUANTA_PER_METRE);
-            let [lowest, highest] = [height - run / FILL_RUN, height + run / CUT_RUN].map(rounded);
-            self.heights[index] = Some(ground.clamp(lowest, highest));
+        for (index, (steps, edge)) in nearest {
+            let moved = |natural: i32| rounded(moved_by_road(edge, steps * quanta_per_step, natural.into()));
+            self.heights[index] = self.heights[index].map(|natural| natural + moved(natural));
         }
     }
 
@@ -288,7 +284,7 @@ fn around(row: i32, col: i32, away: i32) -> Vec<(i32, i32)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{FeatureSurface, Features, HOLE_CLASS, TileId};
+    use terrain::{FeatureSurface, Features, HOLE_CLASS, SideSlope, TileId};
 
     const STEPS: i32 = 64;
 
@@ -305,7 +301,7 @@ mod tests {
         Vertex { at: LatticePoint::new(steps(row), steps(col)), height }
     }
 
-    fn features(surfaces: Vec<FeatureSurface>, slopes: Vec<[Vertex; 2]>) -> TileFeatures {
+    fn features(surfaces: Vec<FeatureSurface>, slopes: Vec<SideSlope>) -> TileFeatures {
         let kept = Features { steps_per_post: STEPS, ..Features::default() };
         TileFeatures { kept, surfaces, slopes, ..TileFeatures::none(TileId { row: 0, col: 0 }) }
     }
@@ -382,23 +378,27 @@ mod tests {
     }
 
     #[test]
-    fn ground_beside_a_road_is_cut_and_filled_as_far_as_slopes_reach() {
-        let edge = [vertex(10.0, -5.0, 1280), vertex(10.0, 25.0, 1280)];
-        // High ground north of the road, low ground south of it.
-        let ground = |post: Post| Some(if 10 < post.row { 12_800 } else { 0 });
-        let window = burned(window(ground), &features(Vec::new(), vec![edge]));
-        let height = |row| window.dem.height(Post::new(row, 10));
-        assert_eq!(height(11), 1280 + rounded(1280.0 / 1.5));
-        assert_eq!((height(9), height(8), height(7)), (640, 0, 0));
-        let featured = |row| window.featured.contains(&Post::new(row, 10));
-        assert_eq!((featured(9), featured(8), featured(11), featured(17)), (true, false, true, false));
-        assert_eq!(height(17), 12_800);
+    fn ground_beside_a_road_is_cut_and_filled_until_slopes_end_as_on_level_ground() {
+        let heights = |off: i32, ground: &dyn Fn(i32) -> i32| -> Vec<i32> {
+            let ends = [vertex(10.0, -5.0, 1280), vertex(10.0, 25.0, 1280)];
+            let slopes = vec![SideSlope { ends, ground: [1280 + off; 2] }];
+            let window = burned(window(|post| Some(ground(post.row - 10))), &features(Vec::new(), slopes));
+            (11..16).map(|row| window.dem.height(Post::new(row, 10)) - ground(row - 10)).collect()
+        };
+        // A post is 1,280 quanta wide.
+        assert_eq!(heights(-1280, &|_| 0), [640, 0, 0, 0, 0]);
+        assert_eq!(heights(2560, &|_| 3840), [-1707, -853, 0, 0, 0]);
+        // A hillside as steep as the slope, and steeper: no wall stands where it ends.
+        assert_eq!(heights(-1280, &|posts| -640 * posts), [640, 0, 0, 0, 0]);
+        assert_eq!(heights(-2560, &|posts| -1280 * (posts + 1)), [1920, 1280, 640, 0, 0]);
+        // A wall that the DEM has stays, but for 5 m at the edge.
+        assert_eq!(heights(0, &|posts| 12_800 * posts), [0; 5]);
     }
 
     #[test]
     fn ground_beside_water_slopes_to_it() {
         let ends = [vertex(10.0, -20.0, -1536), vertex(10.0, 40.0, -1536)];
-        let watersides = vec![terrain::Waterside { ends, ground: [0; 2] }];
+        let watersides = vec![SideSlope { ends, ground: [0; 2] }];
         let window = burned(window(|_| Some(0)), &TileFeatures { watersides, ..features(Vec::new(), Vec::new()) });
         let height = |row| window.dem.height(Post::new(row, 10));
         assert_eq!([10, 11, 12, 13].map(height), [-1536, -896, -256, 0]);

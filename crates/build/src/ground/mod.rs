@@ -11,7 +11,7 @@ pub use planned::{PlannedTile, planned_tiles};
 mod bounds;
 pub use bounds::Bounds;
 mod burn;
-pub use burn::{burn, posts_inside, slope_reach, waterside_reach};
+pub use burn::{burn, posts_inside, roadside_reach, waterside_reach};
 mod buildings;
 mod canopy;
 mod lines;

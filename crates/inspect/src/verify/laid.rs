@@ -86,7 +86,7 @@ impl Laid<'_> {
         let own: HashSet<[At; 2]> = lake.edges().flat_map(|[a, b]| [[a, b], [b, a]]).collect();
         let edges = kept.edges.iter().filter(|edge| !own.contains(*edge)).flatten().copied();
         // Roads may share edges with a shore, and so may other water.
-        let roads = self.features.slopes.iter().flatten().map(|vertex| self.at(vertex.at));
+        let roads = self.features.slopes.iter().flat_map(|slope| slope.ends).map(|vertex| self.at(vertex.at));
         let rings =
             bodies.iter().filter(|body| !std::ptr::eq(*body, lake)).flat_map(|body| body.rings.iter().flatten());
         let others: HashSet<At> = edges.chain(roads).chain(rings.map(|(at, _)| *at)).collect();

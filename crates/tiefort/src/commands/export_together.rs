@@ -89,6 +89,8 @@ fn under(Covered { left_out, cut }: Covered) -> Option<String> {
     let are = if cut == 1 { "is" } else { "are" };
     let [left_out_count, cut_count] = [left_out, cut].map(|count| grouped(count as u64));
     (0 < left_out + cut).then(|| {
-        format!("{left_out_count} {modules} left out under finer areas, {cut_count} {are} cut at their borders")
+        format!(
+            "of these {left_out_count} {modules} left out under finer areas, {cut_count} {are} cut at their borders"
+        )
     })
 }

@@ -106,7 +106,7 @@ impl Forged {
     fn lift_lines(&mut self, at: LatticePoint, by: i32) {
         for (_, features) in &mut self.of_features().lines {
             let rings = features.surfaces.iter_mut().chain(&mut features.decks).flat_map(|surface| &mut surface.ring);
-            let slopes = features.slopes.iter_mut().flatten();
+            let slopes = features.slopes.iter_mut().flat_map(|slope| &mut slope.ends);
             for vertex in features.kept.vertices.iter_mut().chain(rings).chain(slopes).filter(|vertex| vertex.at == at)
             {
                 vertex.height += by;
