@@ -117,9 +117,13 @@ async fn in_json(request: Request, next: Next) -> Response {
     let (head, body) = response.into_parts();
     let said = to_bytes(body, WORDS_MAX).await.unwrap_or_default();
     let refusal = match status {
+        // Every address takes one of the two.
         StatusCode::METHOD_NOT_ALLOWED => {
-            let allowed = head.headers.get(header::ALLOW).and_then(|methods| methods.to_str().ok());
-            let expected = allowed.and_then(|methods| methods.split(',').next()).unwrap_or("another method");
+            let expected = match method {
+                Method::GET | Method::HEAD => "POST",
+                Method::POST => "GET",
+                _ => "GET or POST",
+            };
             Refusal::new(status, format!("found {method}, expected {expected}"), "/docs lists what can be asked")
         }
         status => {

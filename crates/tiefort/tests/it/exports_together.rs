@@ -42,7 +42,7 @@ fn several_databases_are_one_tileset_in_which_the_finer_lies_above_the_coarser()
     let said = export(&["3dtiles", "--out", "one", "--workers", "1"]);
     for part in [
         "west.tdb: the geoid EGM96 was added to heights",
-        "west.tdb: 1 load module is left out under finer areas, 8 are cut at their borders",
+        "west.tdb: of these 1 load module is left out under finer areas, 8 are cut at their borders",
         "east.tdb: 16 load modules, ",
         "3 databases in one tileset, ",
     ] {
