@@ -8,7 +8,8 @@ use std::collections::HashMap;
 
 use source_files::Crs;
 use store::Area;
-use terrain::{Decks, HOLE_CLASS, LoadModule, ModuleVertex, Objects, QUANTA_PER_METRE};
+use terrain::plans::{Plan, common, difference};
+use terrain::{Decks, HOLE_CLASS, LoadModule, ModuleVertex, Objects, Prism, QUANTA_PER_METRE};
 
 use crate::{ExportError, Product};
 
@@ -104,15 +105,35 @@ impl Cover {
         (0..2).all(|axis| (back_m[axis] - place_m[axis]).abs() < 1.0).then_some(seen_m)
     }
 
-    fn share(&self, side: u16, corner_m: [f64; 2]) -> Share {
+    /// Least and largest easting and northing of a square in the system of the finer area.
+    fn spans(&self, side: u16, corner_m: [f64; 2]) -> Option<[[f64; 2]; 2]> {
         let steps = [0.0, 0.5, 1.0].map(|share| share * f64::from(side));
         let places = steps.iter().flat_map(|&y| steps.map(|x| self.seen(corner_m, [x, y])));
-        let Some(places) = places.collect::<Option<Vec<_>>>() else { return Share::Nothing };
+        let places = places.collect::<Option<Vec<_>>>()?;
         let ends = |axis: usize| {
             let values = || places.iter().map(|place| place[axis]);
             [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
         };
-        let spans = [ends(0), ends(1)];
+        Some([ends(0), ends(1)])
+    }
+
+    /// What it covers of a square and of what lies around that, in quanta from the square's corner.
+    fn plan_over(&self, side: u16, corner_m: [f64; 2]) -> Option<Plan> {
+        let spans = self.spans(side, corner_m)?;
+        // A square turned in the other system reaches beyond its corners there.
+        let wide = |axis: usize| spans[axis][1] - spans[axis][0];
+        let low = [0, 1].map(|axis| self.low_m[axis].max(spans[axis][0] - wide(axis)));
+        let high = [0, 1].map(|axis| self.high_m[axis].min(spans[axis][1] + wide(axis)));
+        let at = |place_m: [f64; 2]| {
+            let own_m = self.fine.to(&self.coarse, place_m)?;
+            Some([0, 1].map(|axis| ((own_m[axis] - corner_m[axis]) * f64::from(QUANTA_PER_METRE)).round() as i32))
+        };
+        let ring = [low, [high[0], low[1]], high, [low[0], high[1]]].into_iter().map(at).collect::<Option<_>>()?;
+        Some(vec![ring])
+    }
+
+    fn share(&self, side: u16, corner_m: [f64; 2]) -> Share {
+        let Some(spans) = self.spans(side, corner_m) else { return Share::Nothing };
         let is_beside =
             |axis: usize| spans[axis][1] <= self.low_m[axis] + NEAR_M || self.high_m[axis] - NEAR_M <= spans[axis][0];
         let is_inside =
@@ -169,8 +190,10 @@ impl Cover {
         }
         let (deck_vertices, deck_triangles) = above.numbered().ok_or_else(too_many)?;
         module.decks = Decks { vertices: deck_vertices, triangles: deck_triangles, classes: above.classes };
-        let covers = |[x, y]: [i32; 2]| corner([x, y, 0]).is_some_and(|corner| self.holds(corner.seen_m));
-        module.objects.prisms.retain(|prism| !covers(middle(prism.plan().iter().flatten())));
+        if let Some(plan) = self.plan_over(module.side, corner_m) {
+            let prisms = std::mem::take(&mut module.objects.prisms);
+            module.objects.prisms = prisms.into_iter().flat_map(|prism| beside(prism, &plan)).collect();
+        }
         for canopy in &mut module.objects.canopies {
             let mut left = Pieces::default();
             for triangle in &canopy.triangles {
@@ -191,12 +214,38 @@ impl Cover {
     }
 }
 
-/// The middle of the rectangle around places.
-fn middle<'a>(places: impl Iterator<Item = &'a [i32; 2]> + Clone) -> [i32; 2] {
-    [0, 1].map(|axis| {
-        let values = || places.clone().map(|place| place[axis]);
-        i32::midpoint(values().min().unwrap_or(0), values().max().unwrap_or(0))
-    })
+/// What of a prism lies beside a plan: as it was where they have nothing in common, else in pieces, which have no wall
+/// along the cut: the other area goes on there.
+fn beside(prism: Prism, plan: &Plan) -> Vec<Prism> {
+    let (own, plan) = ([prism.plan()], std::slice::from_ref(plan));
+    if common(&own, plan).is_empty() {
+        return vec![prism];
+    }
+    let corner = |(a, b): ([i32; 2], [i32; 2])| {
+        let middle = [0, 1].map(|axis| f64::midpoint(a[axis].into(), b[axis].into()));
+        let [x, y] = a.map(|at| at.clamp(0, u16::MAX.into()) as u16);
+        terrain::Corner { x, y, has_wall: prism.rings.iter().any(|ring| has_wall_at(ring, middle)) }
+    };
+    let edges =
+        |ring: &Vec<[i32; 2]>| ring.iter().copied().zip(ring.iter().copied().cycle().skip(1)).collect::<Vec<_>>();
+    let piece = |left: Plan| Prism {
+        rings: left.iter().map(|ring| edges(ring).into_iter().map(corner).collect()).collect(),
+        ..prism.clone()
+    };
+    difference(&own, plan).into_iter().map(piece).collect()
+}
+
+/// Whether a wall of a ring passes within two quanta of a place: rounding moves edges by one.
+fn has_wall_at(ring: &[terrain::Corner], [x, y]: [f64; 2]) -> bool {
+    let passes = |(a, b): (&terrain::Corner, &terrain::Corner)| {
+        let [along_x, along_y] = [f64::from(b.x) - f64::from(a.x), f64::from(b.y) - f64::from(a.y)];
+        let [to_x, to_y] = [x - f64::from(a.x), y - f64::from(a.y)];
+        let whole = along_x * along_x + along_y * along_y;
+        let share = ((to_x * along_x + to_y * along_y) / whole.max(1.0)).clamp(0.0, 1.0);
+        let [off_x, off_y] = [to_x - share * along_x, to_y - share * along_y];
+        a.has_wall && off_x * off_x + off_y * off_y <= 4.0
+    };
+    ring.iter().zip(ring.iter().cycle().skip(1)).any(passes)
 }
 
 /// What of a polygon lies on one side of a line; empty where it only touches that.
@@ -363,5 +412,15 @@ mod tests {
         let objects = &product.modules[0].objects;
         assert_eq!(objects.prisms.iter().map(|prism| prism.id).collect::<Vec<_>>(), [3]);
         assert_eq!(objects.canopies[0].places.iter().map(|place| place[0]).max(), Some(430 * 128));
+        // Through the yard of the house: what is left of it is open along the cut.
+        let mut product = samples::with_objects();
+        let through = Cover { low_m: [505_484.375, 3_874_000.0], ..cover() };
+        assert_eq!(take_out(&mut product, &[through]).unwrap(), Covered { left_out: 1, cut: 1 });
+        let prisms = &product.modules[0].objects.prisms;
+        assert_eq!(prisms[0], samples::with_objects().modules[0].objects.prisms[0]);
+        let of: Vec<_> = prisms[1].rings[0].iter().map(|at| (at.x / 1000, at.y / 1000, at.has_wall)).collect();
+        let walls = [(60, 20, true), (62, 20, false), (62, 22, true), (61, 22, true), (61, 24, true)];
+        assert_eq!(of, [&walls[..], &[(62, 24, false), (62, 26, true), (60, 26, true)]].concat());
+        assert_eq!((prisms.len(), prisms[1].id, prisms[1].rings.len()), (2, 7, 1));
     }
 }
