@@ -391,7 +391,7 @@ mod tests {
         // A hillside as steep as the slope, and steeper: no wall stands where it ends.
         assert_eq!(heights(-1280, &|posts| -640 * posts), [640, 0, 0, 0, 0]);
         assert_eq!(heights(-2560, &|posts| -1280 * (posts + 1)), [1920, 1280, 640, 0, 0]);
-        // A wall that the DEM has stays, but for 5 m at the edge.
+        // A wall that the DEM has stays where no rough ground beside the road is reached.
         assert_eq!(heights(0, &|posts| 12_800 * posts), [0; 5]);
     }
 

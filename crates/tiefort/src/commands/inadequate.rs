@@ -104,9 +104,8 @@ fn text(found: &Inadequate, files: &[PathBuf; 3]) -> String {
     let all = &found.components;
     let posts: u64 = all.iter().map(|component| component.posts).sum();
     let mut text = format!(
-        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\nagainst the ground that \
-         tiles were refined to, with roads and water burned in; `tiefort fidelity --against` measures against a \
-         raster\n",
+        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\nagainst the ground that tiles were refined to, \
+         any roads and water in it; `tiefort fidelity --against FILE` measures against a raster\n",
         found.area,
         grouped(all.len() as u64),
         grouped(posts),
