@@ -1,4 +1,6 @@
-//! Metres at doors, integers inside: height quanta and the spacing of the working grid.
+//! Metres at doors, integers inside: height quanta, the spacing of the working grid, and where it lies.
+
+use super::Post;
 
 /// Height quanta in a metre; every height the compiler handles is a whole number of them.
 pub const QUANTA_PER_METRE: i32 = 128;
@@ -73,6 +75,34 @@ impl Spacing {
     }
 }
 
+/// Position and spacing of the working grid, in metres of the area's projected coordinate system.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridFrame {
+    /// Easting of post (0, 0), in metres.
+    pub origin_east_m: f64,
+    /// Northing of post (0, 0), in metres.
+    pub origin_north_m: f64,
+    /// Distance between neighbouring posts, the same both ways.
+    pub spacing: Spacing,
+}
+
+impl GridFrame {
+    /// Easting of a column of posts, in metres.
+    pub fn east_m(&self, col: i32) -> f64 {
+        self.origin_east_m + f64::from(col) * self.spacing.metres()
+    }
+
+    /// Northing of a row of posts, in metres.
+    pub fn north_m(&self, row: i32) -> f64 {
+        self.origin_north_m + f64::from(row) * self.spacing.metres()
+    }
+
+    /// Easting and northing of `post`, in metres.
+    pub fn place_m(&self, post: Post) -> [f64; 2] {
+        [self.east_m(post.col), self.north_m(post.row)]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,5 +140,13 @@ mod tests {
         assert!(Spacing::from_metres(0.0).is_none());
         assert_eq!(Spacing::from_metres(25.0).unwrap().posts_in(Metres(500.0)), Some(20));
         assert_eq!(Spacing::from_metres(25.0).unwrap().posts_in(Metres(510.0)), None);
+    }
+
+    #[test]
+    fn a_post_lies_its_row_north_and_its_column_east_of_the_origin() {
+        let spacing = Spacing::from_metres(31.25).unwrap();
+        let grid = GridFrame { origin_east_m: 500_000.5, origin_north_m: 3_900_000.0, spacing };
+        assert_eq!(grid.place_m(Post::new(0, 0)), [500_000.5, 3_900_000.0]);
+        assert_eq!(grid.place_m(Post::new(-2, 4)), [500_125.5, 3_899_937.5]);
     }
 }

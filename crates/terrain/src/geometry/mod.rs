@@ -23,8 +23,8 @@ mod scan;
 pub use scan::{
     WIDENED_MAX, largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts, widened,
 };
-mod level;
-pub use level::{levels_available, widest_level};
+mod lanes;
+pub use lanes::{levels_available, widest_level};
 mod bounds;
 pub use bounds::{BEYOND_LEAST, height_bounds, height_bounds_in};
 mod ridge;

@@ -4,8 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
-use crate::limits::{ShortOf, Shortfall};
-
 /// Triangles one tile may add to its start, by load module, by window and in all.
 ///
 /// Tiles spend from their own allowances only; the allowances of all tiles together respect every limit,
@@ -211,6 +209,28 @@ impl Ledger {
         let room = &mut self.allowance.module_room[index];
         *room = room.saturating_sub(cost);
     }
+}
+
+/// An allowance that is exceeded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shortfall {
+    /// Whose allowance.
+    pub of: ShortOf,
+    /// Triangles that are needed there.
+    pub needed: u32,
+    /// Triangles that there are.
+    pub room: u32,
+}
+
+/// Whose allowance falls short.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ShortOf {
+    /// A load module's.
+    Module(ModuleId),
+    /// That of the window with this south-west load module.
+    Window(ModuleId),
+    /// That of the whole tile.
+    Tile,
 }
 
 #[cfg(test)]

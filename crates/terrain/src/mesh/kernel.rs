@@ -3,8 +3,6 @@
 use crate::PostRect;
 use crate::geometry::LocalPost;
 
-use crate::mesh::Lines;
-
 /// An edge as `triangle * 4 + index of its first corner`.
 pub type EdgeRef = u32;
 
@@ -219,6 +217,62 @@ impl Mesh {
             }
         }
         gap
+    }
+}
+
+/// Constraint lines of a working tile: every `step` posts from its south-west corner, or none.
+///
+/// An edge is constrained exactly when both its ends lie on the same line, so no flag is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lines {
+    /// Posts between lines; `u32::MAX` where there are none.
+    step: u32,
+    /// `ceil(2^32 / step)`: a multiple of `step` times this wraps to less than `reciprocal`.
+    reciprocal: u32,
+}
+
+impl Lines {
+    /// Lines every `step` posts, from the tile's south-west corner.
+    ///
+    /// # Panics
+    /// When `step` is below 2: every post would lie on a line.
+    pub fn every(step: i32) -> Self {
+        assert!(2 <= step, "load modules are at least two cells wide");
+        Self { step: step as u32, reciprocal: (u32::MAX / step as u32) + 1 }
+    }
+
+    /// No lines: a mesh free to be Delaunay.
+    pub fn none() -> Self {
+        Self { step: u32::MAX, reciprocal: 0 }
+    }
+
+    /// Posts between lines, if there are any.
+    pub fn step(&self) -> Option<i32> {
+        (self.step != u32::MAX).then_some(self.step as i32)
+    }
+
+    #[inline(always)]
+    fn holds(&self, at: i32) -> bool {
+        // Divisibility by multiplication: exact for `at` below 2^16 (the packed range).
+        (at as u32).wrapping_mul(self.reciprocal) < self.reciprocal
+    }
+
+    /// Whether `post` lies on a line of posts running east.
+    #[inline(always)]
+    pub fn holds_row(&self, post: LocalPost) -> bool {
+        self.holds(post.row())
+    }
+
+    /// Whether `post` lies on a line of posts running north.
+    #[inline(always)]
+    pub fn holds_col(&self, post: LocalPost) -> bool {
+        self.holds(post.col())
+    }
+
+    /// Whether the edge `a`, `b` lies on a line.
+    #[inline(always)]
+    pub fn constrain(&self, a: LocalPost, b: LocalPost) -> bool {
+        (a.row() == b.row() && self.holds_row(a)) || (a.col() == b.col() && self.holds_col(a))
     }
 }
 

@@ -14,10 +14,6 @@
 //! ```
 
 mod kernel;
-pub use kernel::{EdgeRef, Mesh, NO_TWIN, Triangle};
-mod lines;
-pub use lines::Lines;
+pub use kernel::{EdgeRef, Lines, Mesh, NO_TWIN, Triangle};
 mod delaunay;
-pub use delaunay::delaunay;
-mod constrained;
-pub use constrained::constrained_delaunay;
+pub use delaunay::{constrained_delaunay, delaunay};

@@ -3,7 +3,7 @@
 
 use fearless_simd::{Simd, i32x8, i32x16, prelude::*};
 
-use super::lanes::IOTA;
+use crate::geometry::lanes::IOTA;
 use crate::geometry::{Facet, LocalPost, Surface};
 
 macro_rules! box_of_lanes {

@@ -7,10 +7,10 @@ use std::ops::ControlFlow;
 
 use fearless_simd::{Simd, f64x8, i32x8, i32x16, prelude::*};
 
-use super::lanes::IOTA;
 use super::squares::widened;
 use super::visit::CandidateSpans;
 use crate::geometry::blocks::{BlockHeights, Blocks, SIDE, TOGETHER};
+use crate::geometry::lanes::IOTA;
 use crate::geometry::{Facet, LocalPost, LocalRect, Surface};
 
 /// Largest `|n|` over the candidate posts of the closed triangle.

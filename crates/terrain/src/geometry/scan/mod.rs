@@ -7,7 +7,6 @@
 
 mod boxes;
 mod far;
-mod lanes;
 mod near;
 mod squares;
 mod visit;
@@ -18,7 +17,7 @@ use fearless_simd::Simd;
 
 use crate::geometry::{Blocks, Facet, LocalPost, Surface};
 
-pub use lanes::rounded;
+pub use crate::geometry::lanes::rounded;
 pub use squares::{WIDENED_MAX, squares_sum, widened};
 pub use visit::{visit_owned, visit_posts};
 

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 
 use fearless_simd::{Simd, i32x16, prelude::*};
 
-use super::lanes::IOTA;
 use super::visit::CandidateSpans;
+use crate::geometry::lanes::IOTA;
 use crate::geometry::{Facet, LocalPost, Surface};
 
 /// Plane numerators of a row, 16 posts at a time.

@@ -7,8 +7,8 @@
 
 use fearless_simd::{Simd, f64x8, i32x8, i32x16, prelude::*};
 
-use super::lanes::{IOTA, rounded};
 use super::visit::{OwnedSpans, visit_owned};
+use crate::geometry::lanes::{IOTA, rounded};
 use crate::geometry::{Facet, Surface};
 
 /// Largest `den` for which the reciprocal rounds exactly.

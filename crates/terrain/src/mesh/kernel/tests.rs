@@ -108,3 +108,20 @@ fn a_start_with_free_corners_is_the_same_grid() {
     insert(&mut free, LocalPost::new(5, 7));
     check(&free, tile);
 }
+
+#[test]
+fn lines_are_the_multiples_of_the_step() {
+    for step in [2, 3, 4, 7, 16, 20, 21, 500] {
+        let lines = Lines::every(step);
+        for at in 0..65_536 {
+            assert_eq!(lines.holds_row(LocalPost::new(at, 1)), at % step == 0, "{at} of {step}");
+        }
+    }
+}
+
+#[test]
+fn without_lines_nothing_is_constrained() {
+    let lines = Lines::none();
+    assert!(!lines.constrain(LocalPost::new(0, 0), LocalPost::new(0, 5)));
+    assert!(!lines.constrain(LocalPost::new(7, 3), LocalPost::new(9, 3)));
+}
