@@ -8,8 +8,7 @@ use std::cell::Cell;
 use std::sync::{Arc, OnceLock};
 
 use crate::horizon::{Horizon, Slope, Vantage};
-use crate::lookup::{Corners, Lookup};
-use crate::object_lookups::ObjectLookups;
+use crate::lookup::{Corners, Lookup, ObjectLookups};
 use crate::past::{Part, Stretch, entered, in_canopies, lost_in, over_canopies};
 use crate::sight::{Curvature, Line, crossed_at, risen_at};
 use crate::{LoadedGround, QUANTA_PER_METRE, Standing, TerrainModule};

@@ -81,7 +81,6 @@ mod horizon;
 pub use header::Header;
 mod vertex;
 pub use vertex::Vertex;
-mod cover;
 mod index;
 pub use index::{DecksEntry, IndexEntry};
 mod decks;
@@ -98,7 +97,6 @@ pub use tile_file::{Bytes, Keep, TileFile, open_file};
 mod file;
 pub use file::SlmFile;
 mod lookup;
-mod object_lookups;
 mod terrain_module;
 pub use terrain_module::{Sample, TerrainModule};
 mod frame;
@@ -119,7 +117,6 @@ mod profile;
 pub use profile::ProfilePoint;
 mod area;
 pub use area::Area;
-mod load;
 
 #[cfg(test)]
 mod sample;

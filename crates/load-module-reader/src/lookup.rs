@@ -6,10 +6,12 @@
 //! most of the time, and the smaller what they read is, the more of it stays in the processor's cache. A place is first
 //! rounded to 1/4096 of a quantum (2 micrometres), after which left or right of an edge is a question about whole
 //! numbers: some triangle always holds the place, on edges and corners too.
+//!
+//! Objects of a load module that may lie along a line are found by cells, too.
 
 use std::sync::Arc;
 
-use crate::{QUANTA_PER_METRE, Vertex};
+use crate::{Canopy, Objects, QUANTA_PER_METRE, Vertex};
 
 /// Steps of a rounded place to a quantum, as a power of two.
 const STEP_BITS: u32 = 12;
@@ -397,4 +399,54 @@ fn extent_between(low: [f64; 2], high: [f64; 2], south: f64, north: f64) -> Opti
     let first = if low[1] < south { at(south) } else { low[0] };
     let last = if north < high[1] { at(north) } else { high[0] };
     Some([first.min(last), first.max(last)])
+}
+
+/// What finds the objects of a load module.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ObjectLookups {
+    /// Of the rectangles around prisms, which are numbered by the third coordinate.
+    pub prisms: Option<Lookup>,
+    /// Of the triangles of canopies, numbered likewise.
+    pub canopies: Vec<Lookup>,
+}
+
+/// Places of canopies that one lookup finds, unless one canopy has more.
+const PLACES_AT_ONCE: usize = 16_384;
+
+impl ObjectLookups {
+    pub(crate) fn of(objects: &Objects, side: u16) -> Self {
+        let mut vertices = Vec::new();
+        for (number, prism) in (0..).zip(&objects.prisms) {
+            let corners = || prism.rings[0].iter();
+            let [west, east] =
+                [corners().map(|c| c.x).min(), corners().map(|c| c.x).max()].map(Option::unwrap_or_default);
+            let [south, north] =
+                [corners().map(|c| c.y).min(), corners().map(|c| c.y).max()].map(Option::unwrap_or_default);
+            let places = [[west, south], [east, south], [east, north], [west, north]];
+            vertices.extend(places.map(|[x, y]| Vertex { x, y, z: number }));
+        }
+        let first = (0..objects.prisms.len()).map(|number| 4 * number as u16);
+        let triangles: Vec<[u16; 3]> = first.flat_map(|at| [[at, at + 1, at + 2], [at, at + 2, at + 3]]).collect();
+        let mesh = Mesh { vertices: &vertices, triangles: &triangles };
+        let prisms = (!triangles.is_empty()).then(|| Lookup::new(mesh, side));
+        Self { prisms, canopies: canopy_lookups(&objects.canopies, side) }
+    }
+}
+
+fn canopy_lookups(canopies: &[Canopy], side: u16) -> Vec<Lookup> {
+    let mut lookups = Vec::new();
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for (number, canopy) in (0..).zip(canopies) {
+        if !vertices.is_empty() && PLACES_AT_ONCE < vertices.len() + canopy.places.len() {
+            lookups.push(Lookup::new(Mesh { vertices: &vertices, triangles: &triangles }, side));
+            (vertices, triangles) = (Vec::new(), Vec::new());
+        }
+        let first = vertices.len() as u16;
+        vertices.extend(canopy.places.iter().map(|&[x, y]| Vertex { x, y, z: number }));
+        triangles.extend(canopy.triangles.iter().map(|triangle| triangle.map(|index| first + index)));
+    }
+    if !triangles.is_empty() {
+        lookups.push(Lookup::new(Mesh { vertices: &vertices, triangles: &triangles }, side));
+    }
+    lookups
 }

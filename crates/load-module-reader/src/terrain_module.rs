@@ -1,7 +1,6 @@
 //! One load module ready to be asked.
 
-use crate::lookup::{Corners, Lookup, Mesh};
-use crate::object_lookups::ObjectLookups;
+use crate::lookup::{Corners, Lookup, Mesh, ObjectLookups};
 use crate::{HOLE_CLASS, Module};
 
 /// The ground, or a deck, at one place.

@@ -8,8 +8,8 @@ use std::sync::Arc;
 
 use fastrand::Rng;
 
-use crate::cover::torn_edge_count;
 use crate::lookup::STEPS;
+use crate::module::torn_edge_count;
 use crate::{
     Area, Block, Decks, Keep, LoadedGround, Module, Objects, ReadError, Residual, Sight, SlmFile, TerrainModule,
     TileFile, Vertex, sample,
