@@ -7,18 +7,15 @@
 //!
 //! What is absent: no clock, no files, no printing.
 
+mod attempt;
 mod workers;
-pub use workers::Workers;
-mod error;
-pub use error::ScheduleError;
+pub use attempt::ScheduleError;
+pub use workers::{Workers, for_each_independent};
 mod plan;
 pub use plan::RankedTasks;
-mod attempt;
 mod ranked;
 mod ready;
 pub use ranked::{Event, in_rank_order, in_rank_order_observed};
-mod independent;
-pub use independent::for_each_independent;
 mod heartbeat;
 pub use heartbeat::with_heartbeat;
 mod simulate;
