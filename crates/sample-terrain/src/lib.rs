@@ -16,17 +16,15 @@ mod noise;
 mod patch;
 mod playa;
 mod region;
-mod window;
 
 use terrain::{Dem, PostRect, Spacing, quanta_of_metres};
 
 pub use features::{SampleFeature, SampleShape, features};
 
 use drainage::Posts;
-use patch::{BLOCK_M, Block};
+use patch::{BLOCK_M, Block, Run, runs};
 use playa::Playa;
 use region::Region;
-use window::{Run, runs};
 
 /// The seed used when none is named.
 pub const DEFAULT_SEED: u64 = 1;

@@ -8,10 +8,9 @@ use std::collections::BTreeMap;
 use crate::noise::Stream;
 
 use super::ground::Ground;
-use super::lattice::{NODES, Node, SIDE, STEP_M, place};
+use super::lattice::{Cost, NODES, Node, SIDE, STEP_M, least_cost_path, place, step_cost};
 use super::line::{self, Place};
 use super::roads::{CELL, COARSE, Chain, Class, Roads, WIDE, node_of};
-use super::search::{Cost, least_cost_path, step_cost};
 
 /// Coarse nodes on either side of a road on which it may run.
 const STRIP: usize = 2;

@@ -10,8 +10,7 @@ use crate::playa::Playa;
 use crate::region::Region;
 
 use super::ground::Ground;
-use super::lattice::{Node, STEP_M, place};
-use super::search::{Cost, least_cost_path, step_cost};
+use super::lattice::{Cost, Node, STEP_M, least_cost_path, place, step_cost};
 
 /// Steps of the lattice of the ground a side of a cell.
 pub(super) const CELL: i64 = COARSE * (WIDE as i64 - 1);
