@@ -4,8 +4,8 @@ use std::path::Path;
 
 use terrain::PostRect;
 
-use crate::beside::{RAW_ENDINGS, beside};
 use crate::chunk::{Chunk, Header};
+use crate::content::{RAW_ENDINGS, beside};
 use crate::crs::Crs;
 use crate::dted::{self, Dted};
 use crate::error::{A_JOB, A_TEXT};

@@ -9,11 +9,11 @@ use geojson::{GeoJson, Geometry, GeometryValue, JsonObject};
 use terrain::mask::Polygon;
 
 use crate::SourceError;
-use crate::allowance::Allowance;
 use crate::crs::Crs;
 use crate::features::clip::Vertex;
 use crate::features::raw::Part;
 use crate::features::strict::{self, said_in};
+use crate::limits::Allowance;
 use crate::polygons::projected;
 use crate::store::Store;
 

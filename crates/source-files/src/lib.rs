@@ -8,10 +8,8 @@ pub mod limits;
 
 mod error;
 pub use error::SourceError;
-mod beside;
 mod content;
 pub use content::{FileState, content};
-mod allowance;
 mod crs;
 mod store;
 pub use crs::Crs;
@@ -48,7 +46,6 @@ pub use join::Standing;
 mod mosaic;
 mod warp;
 pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, window_reaching};
-mod chunk_cache;
 mod geoid_file;
 mod windows;
 pub use windows::{Look, Windows};

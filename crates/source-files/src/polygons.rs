@@ -9,14 +9,13 @@ use std::path::Path;
 use geojson::GeoJson;
 use terrain::mask::Polygon;
 
-use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;
 use crate::error::at_most;
 use crate::features::clip::Vertex;
 use crate::features::raw::{Part, RawShape};
 use crate::features::strict::{self, said_in};
 use crate::geopackage::Package;
-use crate::limits::GEOJSON_BYTES_MAX;
+use crate::limits::{Allowance, GEOJSON_BYTES_MAX, VERTEX_BYTES};
 use crate::shapefile::Shape;
 use crate::shapefile_parts::Parts;
 use crate::store::Store;

@@ -1,7 +1,7 @@
 //! The files that a Shapefile consists of, beside each other in a folder or in one zip file.
 
 use crate::SourceError;
-use crate::beside::beside;
+use crate::content::beside;
 use crate::crs::Crs;
 use crate::error::at_most;
 use crate::limits::SHAPEFILE_BYTES_MAX;

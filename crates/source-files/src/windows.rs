@@ -1,9 +1,18 @@
 //! Files of any size, read by window: what is asked for is decoded then, and kept while there is room.
+//!
+//! Tiles that lie beside each other need the same strips of a raster, and are worked on one after the other, so a few
+//! hundred megabytes of decoded chunks spare nearly all repeated decoding, however large the raster is.
 
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex};
+
+use lru::LruCache;
 use terrain::PostRect;
 
-use crate::chunk_cache::ChunkCache;
+use crate::chunk::Chunk;
 use crate::directory::SampleKind;
+use crate::geotiff::FileDecoder;
+use crate::kept::{Kept, locked};
 use crate::{DemFile, Raster, SourceError};
 
 /// Files that are read by window. Several threads may ask at once; none decodes what another is decoding.
@@ -120,5 +129,54 @@ impl DemFile {
     /// Bytes that the posts of `window` take in memory, in the file's own type.
     pub fn bytes_of(&self, window: PostRect) -> u64 {
         window.post_count() as u64 * self.header().kind.bytes()
+    }
+}
+
+/// Open files whose directory is kept read.
+const DECODERS_MAX: usize = 32;
+
+/// A file's place in the list it was given in, and a chunk of it.
+type Key = (usize, u32);
+
+/// Decoded chunks of any number of files.
+struct ChunkCache {
+    kept: Kept<Key, Chunk>,
+    decoders: Mutex<LruCache<usize, Vec<FileDecoder>>>,
+}
+
+impl std::fmt::Debug for ChunkCache {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ChunkCache").field("bytes_max", &self.kept.bytes_max()).finish_non_exhaustive()
+    }
+}
+
+impl ChunkCache {
+    /// With room for `bytes_max` bytes of samples, and one chunk in any case.
+    pub(crate) fn new(bytes_max: u64) -> Self {
+        let decoders = LruCache::new(NonZeroUsize::new(DECODERS_MAX).expect("32 is not 0"));
+        Self { kept: Kept::new(bytes_max), decoders: Mutex::new(decoders) }
+    }
+
+    /// How often a chunk was decoded.
+    pub(crate) fn decoded(&self) -> u64 {
+        self.kept.decoded()
+    }
+
+    /// Chunk `chunk` of `file`, the one at place `index`.
+    pub(crate) fn chunk(&self, file: &DemFile, index: usize, chunk: u32) -> Result<Arc<Chunk>, SourceError> {
+        self.kept.get((index, chunk), || {
+            let decoded = self.decode(file, index, chunk)?;
+            let bytes = decoded.bytes();
+            Ok((decoded, bytes))
+        })
+    }
+
+    fn decode(&self, file: &DemFile, index: usize, chunk: u32) -> Result<Chunk, SourceError> {
+        let mut kept = locked(&self.decoders).get_mut(&index).and_then(Vec::pop);
+        let decoded = file.decode_one(chunk, &mut kept);
+        if let Some(decoder) = kept {
+            locked(&self.decoders).get_or_insert_mut(index, Vec::new).push(decoder);
+        }
+        decoded
     }
 }

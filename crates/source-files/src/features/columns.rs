@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::model::Tags;
 use crate::SourceError;
-use crate::allowance::Allowance;
+use crate::limits::Allowance;
 use crate::store::Store;
 
 /// The rows of a table: each the name and the text of every column that holds something.

@@ -8,9 +8,8 @@ use super::clip::{self, Extent, Vertex};
 use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 use super::raw::{Part, RawFeature};
 use crate::SourceError;
-use crate::allowance::{Allowance, VERTEX_BYTES};
 use crate::crs::Crs;
-use crate::limits::{HEIGHT_M_MAX, REMARKS_MAX};
+use crate::limits::{Allowance, HEIGHT_M_MAX, REMARKS_MAX, VERTEX_BYTES};
 use crate::polygons::pieces_of;
 
 /// Whether most places can only be degrees; what nothing is said about is taken for WGS 84 then.

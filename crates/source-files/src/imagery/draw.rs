@@ -1,4 +1,4 @@
-//! A square of ground drawn from a picture in another coordinate system.
+//! A square of ground drawn from a picture in another coordinate system, and the strips and tiles decoded last.
 //!
 //! Every sixteenth pixel is projected, and what lies between is interpolated. Of the levels, the coarsest is taken that
 //! is as fine as the square. Where it is still so fine that too many of its strips or tiles lie below the square, as
@@ -7,12 +7,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::keep::Keep;
 use super::level::{Level, PIXELS_MAX};
 use super::picture::Imagery;
 use super::unpack::{Colored, colored};
 use crate::SourceError;
 use crate::crs::Crs;
+use crate::kept::Kept;
 
 /// Pixels of a square between projected places.
 const STEP: usize = 16;
@@ -280,4 +280,34 @@ fn standing(level: &Level, [west, north, east, south]: [f64; 4]) -> [u32; 2] {
         stands_for[axis] += 1;
     }
     stands_for.map(|count| count as u32)
+}
+
+/// A picture, its level, and a strip or tile of that.
+type Key = (usize, usize, u32);
+
+/// Decoded strips and tiles of any number of pictures.
+pub struct Keep(Kept<Key, Colored>);
+
+impl Keep {
+    /// With room for `bytes_max` bytes, and one strip or tile in any case.
+    pub fn new(bytes_max: usize) -> Self {
+        Self(Kept::new(bytes_max as u64))
+    }
+
+    /// How often a strip or tile was decoded.
+    pub fn decoded(&self) -> u64 {
+        self.0.decoded()
+    }
+
+    pub(super) fn get(
+        &self,
+        key: Key,
+        decode: impl FnOnce() -> Result<Colored, SourceError>,
+    ) -> Result<Arc<Colored>, SourceError> {
+        self.0.get(key, || {
+            let decoded = decode()?;
+            let bytes = decoded.bytes() as u64;
+            Ok((decoded, bytes))
+        })
+    }
 }

@@ -5,21 +5,18 @@
 //!   level         one of these, cut into strips or tiles
 //!   unpack        a strip or tile as numbers, then as colours
 //!   picture       all of them, opened
-//!   keep          those decoded last
-//!   draw          a square of ground, from the level that is as fine as it
+//!   draw          a square of ground, from the level that is as fine as it; strips and tiles decoded last
 //! ```
 //! A picture is never read whole: a square takes the strips or tiles below it, and no more than [`level::PIXELS_MAX`]
 //! pixels of them.
 
 mod directories;
 mod draw;
-mod keep;
 mod level;
 mod picture;
 mod unpack;
 
-pub use draw::Square;
-pub use keep::Keep;
+pub use draw::{Keep, Square};
 pub use picture::Imagery;
 
 #[cfg(test)]

@@ -5,16 +5,15 @@ use terrain::Each;
 
 use super::assemble::Role;
 use super::block::{Block, MemberKind, Relation, Way};
-use super::kept::{KeptRelation, KeptWay, sort_ways};
+use super::kept::{KeptRelation, KeptWay, KnownTexts, sort_ways, wanted_texts};
 use super::nodes::{Nodes, degrees};
 use super::shapes;
-use super::texts::{KnownTexts, wanted_texts};
 use crate::SourceError;
-use crate::allowance::Allowance;
 use crate::features::clip::Extent;
 use crate::features::columns::Texts;
 use crate::features::model::{BUILDING_KEY, Tags, VectorFeature};
 use crate::features::placing::Placing;
+use crate::limits::Allowance;
 
 /// Keys that say how high a building is. No others are kept: most buildings have an address.
 const KEYS: [&str; 5] = [BUILDING_KEY, "height", "building:levels", "min_height", "building:min_level"];

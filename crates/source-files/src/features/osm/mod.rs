@@ -11,10 +11,8 @@ mod block;
 mod buildings;
 pub(crate) mod frames;
 mod kept;
-mod kinds;
 mod nodes;
 mod shapes;
-mod texts;
 mod wire;
 
 use std::sync::Arc;
@@ -26,17 +24,15 @@ use super::model::{FeatureFile, Tags, Wanted};
 use super::placing::{LEFT_OUT, Placing};
 use super::raw::{Part, RawFeature, RawShape};
 use crate::SourceError;
-use crate::allowance::Allowance;
 use crate::crs::Crs;
+use crate::features::osm::assemble::Role;
+use crate::features::osm::block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
+use crate::features::osm::buildings::{BuildingTexts, Buildings};
+use crate::features::osm::frames::{Frame, FrameKind, Frames, Stop};
+use crate::features::osm::kept::{KeptRelation, KeptWay, KnownTexts, SEGMENT_M_MAX, sort_ways, wanted_texts};
+use crate::features::osm::nodes::{Nodes, degrees};
+use crate::limits::Allowance;
 use crate::store::Store;
-use assemble::Role;
-use block::{Block, Contents, Demands, MemberKind, OFF_THE_EARTH, Way};
-
-use buildings::{BuildingTexts, Buildings};
-use frames::{Frame, FrameKind, Frames, Stop};
-use kept::{KeptRelation, KeptWay, SEGMENT_M_MAX, sort_ways};
-use nodes::{Nodes, degrees};
-use texts::{KnownTexts, wanted_texts};
 
 /// Whom to name (Open Database License, section 4.3).
 pub(super) const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, ODbL 1.0";
@@ -91,7 +87,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted, each: Each) -> Result<Feature
     }
     let Reader { nodes, ways, buildings, .. } = reader;
     let buildings = buildings.map(|buildings| buildings.placed(&nodes, &placing, each)).unwrap_or_default();
-    shapes::place(&nodes, ways, relations, &mut placing, kinds::is_area, each);
+    shapes::place(&nodes, ways, relations, &mut placing, is_area, each);
     Ok(FeatureFile { buildings, ..placing.finish(Some(ATTRIBUTION))? })
 }
 
@@ -349,4 +345,72 @@ fn member_ids(relations: &[KeptRelation]) -> Vec<i64> {
 /// Whether some of the sorted ids lie in a range.
 fn reaches(ids: &[i64], [least, most]: [i64; 2]) -> bool {
     ids.get(ids.partition_point(|&id| id < least)).is_some_and(|&id| id <= most)
+}
+
+/// What a closed way with a key stands for.
+enum Closed {
+    /// An area, but for some values.
+    AreaUnless(&'static [&'static str]),
+    /// A line, but for some values.
+    LineUnless(&'static [&'static str]),
+}
+
+const KEYS: [(&str, Closed); 6] = [
+    (
+        "natural",
+        Closed::AreaUnless(&["coastline", "cliff", "ridge", "arete", "tree_row", "valley", "gully", "earth_bank"]),
+    ),
+    ("landuse", Closed::AreaUnless(&[])),
+    ("water", Closed::AreaUnless(&[])),
+    ("waterway", Closed::LineUnless(&["riverbank", "dock", "boatyard", "dam"])),
+    ("aeroway", Closed::LineUnless(&["apron", "runway", "aerodrome", "helipad", "heliport", "terminal"])),
+    (
+        "man_made",
+        Closed::AreaUnless(&["embankment", "cutline", "dyke", "pipeline", "groyne", "breakwater", "goods_conveyor"]),
+    ),
+];
+
+/// Whether a closed way with these tags is an area: where `area` says so, else where one of its keys does and it is
+/// no road or railway, which may go round in circles.
+fn is_area(tags: &Tags) -> bool {
+    let value = |key: &str| tags.iter().find(|(other, _)| other.as_ref() == key).map(|(_, value)| value.as_ref());
+    match value("area") {
+        Some("yes") => return true,
+        Some("no") => return false,
+        _ => {}
+    }
+    if value("highway").is_some() || value("railway").is_some() {
+        return false;
+    }
+    KEYS.iter().any(|(key, closed)| match (value(key), closed) {
+        (None, _) => false,
+        (Some(value), Closed::AreaUnless(lines)) => !lines.contains(&value),
+        (Some(value), Closed::LineUnless(areas)) => areas.contains(&value),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn check(tags: &[(&str, &str)], expected: bool) {
+        let tags: Tags = tags.iter().map(|&(key, value)| (key.into(), value.into())).collect();
+        assert_eq!(is_area(&tags), expected, "{tags:?}");
+    }
+
+    #[test]
+    fn closed_ways_are_areas_where_their_tags_say_so() {
+        check(&[("highway", "primary")], false);
+        check(&[("highway", "pedestrian"), ("area", "yes")], true);
+        check(&[("highway", "track"), ("landuse", "forest")], false);
+        check(&[("natural", "water")], true);
+        check(&[("natural", "water"), ("area", "no")], false);
+        check(&[("natural", "coastline")], false);
+        check(&[("waterway", "canal")], false);
+        check(&[("waterway", "riverbank")], true);
+        check(&[("aeroway", "taxiway")], false);
+        check(&[("aeroway", "apron")], true);
+        check(&[("name", "x")], false);
+    }
 }

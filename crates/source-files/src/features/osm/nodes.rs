@@ -2,8 +2,8 @@
 
 use super::block::{Decimicro, OFF_THE_EARTH};
 use crate::SourceError;
-use crate::allowance::Allowance;
 use crate::features::clip::Extent;
+use crate::limits::Allowance;
 
 /// Bytes that a node takes in a table, and while that grows.
 const NODE_BYTES: usize = 32;
