@@ -12,8 +12,8 @@ use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::read::{check_stamp, read, refuse_other};
 use crate::{
     AreaLevel, AreaOutlines, Building, DatabaseError, FileStamp, Manifest, ManifestState, Measured, NotADatabase,
-    Profile, Removals, Report, Stamp, TileModules, Work, buildings_file, curve_file, frame, json, level_file,
-    lines_file, measured_file, outlines_file, profile_file, removals_file, slm, tile_file,
+    Profile, Removals, Report, Stamp, TileModules, Work, beside_tile, buildings_file, frame, json, level_file,
+    measured_file, outlines_file, slm, tile_file,
 };
 
 /// The directory of a database, to read from. Holds no file open and no lock.
@@ -203,7 +203,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile.
     pub fn read_removals(&self, tile: TileId) -> Result<(Stamp, Removals), DatabaseError> {
         let path = self.removals_path(tile);
-        let (stamp, read) = removals_file::decode_removals(&path, &self.read(&path)?)?;
+        let (stamp, read) = beside_tile::decode_removals(&path, &self.read(&path)?)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, read))
     }
@@ -317,7 +317,7 @@ impl Folder {
     pub fn read_profile(&self, tile: TileId) -> Result<(Stamp, FileStamp, Profile), DatabaseError> {
         let path = self.profile_path(tile);
         let bytes = self.read(&path)?;
-        let (stamp, read) = profile_file::decode_profile(&path, &bytes)?;
+        let (stamp, read) = beside_tile::decode_profile(&path, &bytes)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, FileStamp::of(&bytes), read))
     }
@@ -329,7 +329,7 @@ impl Folder {
     pub fn read_lines(&self, tile: TileId) -> Result<(FileStamp, TileFeatures), DatabaseError> {
         let path = self.lines_path(tile);
         let bytes = self.read(&path)?;
-        let (_, read) = lines_file::decode_lines(&path, &bytes)?;
+        let (_, read) = beside_tile::decode_lines(&path, &bytes)?;
         same_tile(path, read.tile, tile)?;
         Ok((FileStamp::of(&bytes), read))
     }
@@ -351,7 +351,7 @@ impl Folder {
     /// When the file is missing, damaged or of another tile.
     pub fn read_curve(&self, tile: TileId) -> Result<(Stamp, GainCurve), DatabaseError> {
         let path = self.curve_path(tile);
-        let (stamp, read) = curve_file::decode_curve(&path, &self.read(&path)?)?;
+        let (stamp, read) = beside_tile::decode_curve(&path, &self.read(&path)?)?;
         same_tile(path, read.tile, tile)?;
         Ok((stamp, read))
     }

@@ -26,25 +26,20 @@ mod codec;
 mod frame;
 mod tile_file;
 pub use tile_file::{decode_tile, encode_tile};
-mod curve_file;
-pub use curve_file::{decode_curve, encode_curve};
-mod profile_file;
-pub use profile_file::{Profile, decode_profile, encode_profile};
-mod lines_file;
-pub use lines_file::{decode_lines, encode_lines};
+mod beside_tile;
+pub use beside_tile::{
+    Profile, Removals, decode_curve, decode_lines, decode_profile, decode_removals, encode_curve, encode_lines,
+    encode_profile, encode_removals,
+};
 mod level_file;
 pub use level_file::{
     AreaLevel, CULVERT, FeatureAmounts, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut, FeatureLine,
     FeatureRemark, FeatureWhy, StripFigures, decode_level, encode_level,
 };
-mod report_objects;
-pub use report_objects::{ObjectSums, ReportObjectLimit, ReportObjects};
 mod outlines_file;
 pub use outlines_file::{AreaOutlines, ModuleOutlines, ObjectLeftOut, decode_outlines, encode_outlines};
 mod buildings_file;
 pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
-mod removals_file;
-pub use removals_file::{Removals, decode_removals, encode_removals};
 mod measured_file;
 pub use measured_file::{
     Measured, MeasuredCurvature, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured,
@@ -63,16 +58,17 @@ mod manifest;
 pub use manifest::{
     Area, FORMAT_VERSION, FileStamp, Manifest, ManifestState, SourceRecord, TileRecord, TileState, Totals,
 };
+mod report;
+pub use report::{
+    ObjectSums, Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportEnough,
+    ReportHeights, ReportLevel, ReportLimit, ReportObjectLimit, ReportObjects, ReportPart, ReportPerModule,
+    ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals, ReportResidual, ReportStage, ReportStops,
+    ReportTile, ReportVoids,
+};
 mod report_features;
 pub use report_features::{
     ReportDeckClearance, ReportEarthwork, ReportEarthworks, ReportFarOff, ReportFeatureChecks, ReportFeatureClass,
     ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
-};
-mod report;
-pub use report::{
-    Report, ReportBefore, ReportBorder, ReportBound, ReportBreach, ReportClass, ReportEnough, ReportHeights,
-    ReportLevel, ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool,
-    ReportRefusals, ReportResidual, ReportStage, ReportStops, ReportTile, ReportVoids,
 };
 mod lock;
 pub use lock::Lock;

@@ -10,8 +10,8 @@ use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
 use crate::page::check_page;
 use crate::read::check_stamp;
 use crate::{
-    DatabaseError, FileStamp, Folder, Manifest, buildings_file, curve_file, level_file, lines_file, measured_file,
-    outlines_file, profile_file, removals_file, slm, tile_file,
+    DatabaseError, FileStamp, Folder, Manifest, beside_tile, buildings_file, level_file, measured_file, outlines_file,
+    slm, tile_file,
 };
 
 /// One file that is not as it should be.
@@ -97,13 +97,13 @@ impl Folder {
             }
             Some("slm") => drop(slm::decode_modules(path, &bytes)?),
             Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
-            Some("curve") => drop(curve_file::decode_curve(path, &bytes)?),
-            Some("profile") => drop(profile_file::decode_profile(path, &bytes)?),
-            Some("lines") => drop(lines_file::decode_lines(path, &bytes)?),
+            Some("curve") => drop(beside_tile::decode_curve(path, &bytes)?),
+            Some("profile") => drop(beside_tile::decode_profile(path, &bytes)?),
+            Some("lines") => drop(beside_tile::decode_lines(path, &bytes)?),
             Some("level") => drop(level_file::decode_level(path, &bytes)?),
             Some("outlines") => drop(outlines_file::decode_outlines(path, &bytes)?),
             Some("buildings") => drop(buildings_file::decode_buildings(path, &bytes)?),
-            Some("removed") => drop(removals_file::decode_removals(path, &bytes)?),
+            Some("removed") => drop(beside_tile::decode_removals(path, &bytes)?),
             _ => {}
         }
         check_stamp(path, &bytes, stamp)

@@ -1,8 +1,8 @@
-//! Keep or make: the one place that decides it.
+//! Keep or make, and why: the one place that decides it.
 
 use std::fmt;
 
-use crate::engine::{Cause, Key, Parts, Stamp};
+use crate::engine::{Key, Parts, Stamp};
 
 /// One artifact of one kind: what it is made from, how it is read, how it is made.
 pub trait Artifact {
@@ -110,12 +110,46 @@ fn cause<A: Artifact>(artifact: &A, key: &Key, stamp: &Stamp, published: Result<
     }
 }
 
+/// Why an artifact is made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// Nothing was published.
+    New,
+    /// What was published is not as it was written.
+    Damaged(String),
+    /// Another version of the program made it.
+    Revision {
+        /// The one that did.
+        found: u32,
+        /// This one.
+        now: u32,
+    },
+    /// What was published is of a kind that is always made again; and which.
+    Provisional(&'static str),
+    /// These parts of what it is made from changed.
+    Changed(Vec<&'static str>),
+    /// It was made from something else, and nothing says from what.
+    Other,
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Cause::New => f.write_str("nothing was there"),
+            Cause::Damaged(what) => write!(f, "damaged: {what}"),
+            Cause::Revision { found, now } => write!(f, "made by algorithm revision {found}, now {now}"),
+            Cause::Provisional(which) => f.write_str(which),
+            Cause::Changed(parts) => f.write_str(&parts.join(" and ")),
+            Cause::Other => f.write_str("made from something else by a run that was broken off"),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use std::cell::{Cell, RefCell};
-
     use super::*;
     use crate::engine::Part;
+    use std::cell::{Cell, RefCell};
 
     const INPUT: Part = Part { name: "input", changed: "its input changed" };
 

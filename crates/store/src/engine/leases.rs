@@ -7,14 +7,16 @@
 //! The lease of the highest number counts. No clock is compared with another one: a lease is old when *this* process
 //! has looked at the same bytes for long enough by its own clock, which the caller reads. A process that was only slow
 //! and comes back does no harm, because every task is idempotent; leases save work, they do not make results right.
+//!
+//! Marks say which units of work are done.
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::engine::{Store, StoreError};
+use crate::engine::{Durability, Fingerprint, Store, StoreError, is_temporary};
 
 /// What a lease says whose holder has given up.
 const FREE: &[u8] = b"free\n";
@@ -121,6 +123,64 @@ impl Lease {
     fn write(&self, content: &[u8]) -> Result<(), StoreError> {
         let written = self.store.overwrite(&self.path, content);
         written.map_err(|source| StoreError::new("write", &self.path, content.len(), source))
+    }
+}
+
+/// The marks of one run: a file for each unit of work that is done, with the fingerprint of what it published.
+#[derive(Clone, Debug)]
+pub struct Marks {
+    store: Arc<dyn Store>,
+    folder: PathBuf,
+}
+
+impl Marks {
+    /// The marks in a folder.
+    pub fn new(store: Arc<dyn Store>, folder: PathBuf) -> Self {
+        Self { store, folder }
+    }
+
+    /// Marks a unit of work, such as `refine-r02c03`, as done.
+    ///
+    /// # Errors
+    /// When the mark cannot be written.
+    pub fn mark(&self, unit: &str, fingerprint: Fingerprint) -> Result<(), StoreError> {
+        let (path, text) = (self.path(unit), format!("{fingerprint}\n"));
+        let written = self.store.replace(&path, text.as_bytes(), Durability::Later);
+        written.map_err(|source| StoreError::new("write", &path, text.len(), source))
+    }
+
+    /// The fingerprint of what was published when a unit of work was done; `None` while it is not. A mark that says
+    /// nothing, as a computer leaves it that lost its power, is none and goes.
+    pub fn marked(&self, unit: &str) -> Option<Fingerprint> {
+        let bytes = self.store.read(&self.path(unit)).ok()?;
+        let said = std::str::from_utf8(&bytes).ok().and_then(|text| Fingerprint::from_hex(text.trim_end()));
+        if said.is_none() {
+            self.unmark(unit);
+        }
+        said
+    }
+
+    /// Takes a mark back: what was published turned out to be damaged.
+    pub fn unmark(&self, unit: &str) {
+        // If it cannot be removed, the next reader finds the damage again.
+        let _ = self.store.remove(&self.path(unit));
+    }
+
+    /// Every unit of work that is marked, by ascending name; none once the folder is swept away.
+    ///
+    /// # Errors
+    /// When the folder cannot be listed.
+    pub fn all(&self) -> Result<Vec<String>, StoreError> {
+        let paths = match self.store.list(&self.folder) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Vec::new(),
+            listed => listed.map_err(|source| StoreError::new("list", &self.folder, 0, source))?,
+        };
+        let name = |path: &Path| path.file_name().map(|name| name.to_string_lossy().into_owned());
+        Ok(paths.iter().filter_map(|path| name(path)).filter(|name| !is_temporary(name)).collect())
+    }
+
+    fn path(&self, unit: &str) -> PathBuf {
+        self.folder.join(unit)
     }
 }
 

@@ -9,7 +9,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod store;
-pub use store::{Durability, Entry, Guard, Held, LockKind, Store, StoreError, is_temporary, remove_all};
+pub use store::{Clock, Durability, Entry, Guard, Held, LockKind, Store, StoreError, is_temporary, remove_all};
 mod disk;
 pub use disk::{Disk, Writing, check_writable};
 mod memory;
@@ -18,15 +18,9 @@ mod faulty;
 pub use faulty::{Faults, Faulty, World};
 mod fingerprint;
 pub use fingerprint::{Fingerprint, FingerprintBuilder};
-mod key;
-pub use key::{Key, Part, Parts, Stamp};
-mod cause;
-pub use cause::Cause;
 mod artifact;
-pub use artifact::{Artifact, Before, Outcome, keep_or_make};
-mod clock;
-pub use clock::Clock;
+mod key;
+pub use artifact::{Artifact, Before, Cause, Outcome, keep_or_make};
+pub use key::{Key, Part, Parts, Stamp};
 mod leases;
-pub use leases::{Claim, Lease, Leases};
-mod marks;
-pub use marks::Marks;
+pub use leases::{Claim, Lease, Leases, Marks};

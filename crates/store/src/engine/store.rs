@@ -1,8 +1,9 @@
-//! Where files lie. What writes a database says where by a [`Store`], and never asks the system itself.
+//! Where files lie and what time it is. What writes a database says where by a [`Store`], and never asks the system
+//! itself.
 
-use std::fmt;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
+use std::{fmt, io};
 
 use thiserror::Error;
 
@@ -189,4 +190,18 @@ impl StoreError {
     pub(crate) fn new(action: &'static str, path: &Path, bytes: usize, source: io::Error) -> Self {
         Self { action, path: path.to_path_buf(), bytes: bytes as u64, source }
     }
+}
+
+/// What time it is.
+pub trait Clock: Sync {
+    /// Time since any beginning that stays the same.
+    fn wall(&self) -> Duration;
+
+    /// Processor time of all threads since any beginning; nothing where it is not known.
+    fn cpu(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// Returns after so much time.
+    fn wait(&self, time: Duration);
 }

@@ -67,7 +67,7 @@ fn key(field: &syn::Field) -> Key {
 
 fn definition() -> Definition {
     let mut found = Definition { keys: BTreeMap::new(), places: Vec::new() };
-    for file in ["report.rs", "report_features.rs", "report_objects.rs", "manifest.rs"] {
+    for file in ["report.rs", "report_features.rs", "manifest.rs"] {
         let text = std::fs::read_to_string(root().join("crates/store/src").join(file)).unwrap();
         for item in syn::parse_file(&text).unwrap().items {
             match item {
