@@ -1,20 +1,20 @@
 //! Heights of rivers and streams: they fall, and lie where most of the DEM along them says.
 //!
+//! OpenStreetMap draws them downhill, others anyhow, and a few the wrong way round: which way they flow is asked first.
 //! Heights lie closest to the ground, by the sum of their distances, while no edge rises; what lies above the fit
 //! weighs less than what lies below, since a DEM sees trees and banks rather than water. A lake is one more node, tied
-//! to the stations inside it. Then the fit is carved down to its banks, as far as it may be, and pools become slopes.
+//! to the stations inside it. Then the fit is carved down to its banks, as far as it may be, and pools become slopes:
+//! between two steps of a DEM of whole metres a river falls evenly.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 
 use crate::clean::Notes;
 use crate::fit::{Problem, Tie, fit, keep_ties};
 use crate::flow::Flow;
 use crate::forest::{Range, Sample, UNBOUNDED};
 use crate::grade::samples_of;
-use crate::orient::orient;
 use crate::smooth::filled;
-use crate::tilt::tilt;
-use crate::{FeatureId, Flaw, Network, Place, Remark, Remedy};
+use crate::{FeatureId, Flaw, Kind, Network, Numbering, Place, Remark, Remedy};
 
 /// Rounds in which loops of rivers are fitted.
 const ROUNDS: u64 = 2;
@@ -258,11 +258,116 @@ fn remark_moved(network: &Network, still: &[Still], levels: &[i64], remarks: &mu
     }
 }
 
+/// Quanta a station that turning a way has to save: 1 m. Less is noise.
+const SAVED_MIN: i64 = terrain::QUANTA_PER_METRE as i64;
+
+/// Which edges flow against the direction of their way. A way is turned round when the sum of distances between its
+/// ground and the nearest profile that falls is halved by that, and well beyond noise.
+fn orient(network: &Network, ground: &[i32], remarks: &mut Vec<Remark>) -> Vec<bool> {
+    let mut turned = vec![false; network.edges.len()];
+    let mut first = 0;
+    for edges in network.edges.chunk_by(|a, b| a.way == b.way) {
+        let of_way = first..first + edges.len();
+        first += edges.len();
+        if edges[0].a == edges[edges.len() - 1].b {
+            // A closed way has no lower end.
+            continue;
+        }
+        let mut along: Vec<i32> = vec![ground[edges[0].a as usize]];
+        along.extend(edges.iter().map(|edge| ground[edge.b as usize]));
+        let id = network.ways[edges[0].way as usize].id;
+        let uphill = along[0] < along[along.len() - 1];
+        let drawn_downhill = id.numbering != Numbering::Row;
+        let forth = cost_of_falling(along.iter().copied());
+        let back = cost_of_falling(along.iter().rev().copied());
+        let saves = |from: i64, to: i64| 2 * to < from && SAVED_MIN * (along.len() as i64) < from - to;
+        let turn = if drawn_downhill || !uphill { saves(forth, back) } else { !saves(back, forth) };
+        if turn {
+            turned[of_way].fill(true);
+        }
+        if turn && drawn_downhill {
+            let place = network.nodes[edges[0].a as usize].place;
+            Notes { id, lattice: network.lattice, remarks }.write_at(place, Flaw::FlowsUphill, Remedy::TurnedRound);
+        }
+    }
+    turned
+}
+
+/// The least sum of distances between values and a sequence that never rises: each value that rises above the lowest
+/// so far throws that down, so far as it reaches (the slope trick).
+fn cost_of_falling(values: impl Iterator<Item = i32>) -> i64 {
+    let (mut lowest, mut cost): (BinaryHeap<std::cmp::Reverse<i64>>, i64) = (BinaryHeap::new(), 0);
+    for value in values.map(i64::from) {
+        lowest.push(std::cmp::Reverse(value));
+        let low = lowest.peek().map_or(value, |low| low.0);
+        if low < value {
+            cost += value - low;
+            lowest.pop();
+            lowest.push(std::cmp::Reverse(value));
+        }
+    }
+    cost
+}
+
+/// Tilts the pools of rivers and canals through their middles, chain by chain. The ends of chains and nodes that lie
+/// level stay as they are.
+fn tilt(network: &Network, heights: &mut [i64], is_level: &[bool]) {
+    let picked = |edge: u32| network.traits(edge).kind == Kind::River;
+    let follows = |node: u32| match network.beside(node) {
+        [(_, one), (_, other)] => picked(*one) && picked(*other) && !is_level[node as usize],
+        _ => false,
+    };
+    for (nodes, edges) in network.runs(&picked, &follows) {
+        if nodes[0] == nodes[nodes.len() - 1] {
+            continue;
+        }
+        let mut along = vec![0i64];
+        for edge in edges {
+            along.push(along[along.len() - 1] + i64::from(network.edges[edge as usize].length));
+        }
+        let values: Vec<i64> = nodes.iter().map(|node| heights[*node as usize]).collect();
+        let tilted = tilted(&along, &values);
+        for at in 1..nodes.len() - 1 {
+            heights[nodes[at] as usize] = tilted[at];
+        }
+    }
+}
+
+/// The values on straight lines through the middles of their pools, and through their ends, rounded down.
+fn tilted(along: &[i64], values: &[i64]) -> Vec<i64> {
+    let last = values.len() - 1;
+    // Twice the way to each knot, and its value.
+    let mut knots = vec![(2 * along[0], values[0])];
+    let mut from = 0;
+    while from <= last {
+        let mut to = from;
+        while to < last && values[to + 1] == values[from] {
+            to += 1;
+        }
+        if 0 < from && to < last {
+            knots.push((along[from] + along[to], values[from]));
+        }
+        from = to + 1;
+    }
+    knots.push((2 * along[last], values[last]));
+    let mut knot = 0;
+    let at = |&place: &i64| {
+        while knot + 2 < knots.len() && knots[knot + 1].0 <= 2 * place {
+            knot += 1;
+        }
+        let ((from, value), (to, next)) = (knots[knot], knots[knot + 1]);
+        let (run, rise) = (i128::from((to - from).max(1)), i128::from(next - value));
+        value + (rise * i128::from(2 * place - from)).div_euclid(run) as i64
+    };
+    along.iter().map(at).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::samples::{network, way};
-    use proptest::prelude::*;
 
     /// Lakes are nodes with a level: each level is one lake.
     #[track_caller]
@@ -397,5 +502,26 @@ mod tests {
             let lake: Vec<_> = (0..network.nodes.len()).map(|node| lakes[node % 37]).collect();
             check(&network, &ground, &lake);
         }
+    }
+
+    fn least_cost(values: &[i32], most: i32) -> i64 {
+        let Some((first, rest)) = values.split_first() else { return 0 };
+        let with = |level: i32| i64::from((first - level).abs()) + least_cost(rest, level);
+        (0..=most).map(with).min().unwrap_or(0)
+    }
+
+    proptest! {
+        #[test]
+        fn no_falling_sequence_costs_less(values in proptest::collection::vec(0..5i32, 0..6)) {
+            prop_assert_eq!(cost_of_falling(values.iter().copied()), least_cost(&values, 4));
+        }
+    }
+
+    #[test]
+    fn steps_become_one_slope_and_what_is_straight_stays() {
+        let along = [0, 10, 20, 30, 40, 50];
+        assert_eq!(tilted(&along, &[50, 40, 30, 20, 10, 0]), [50, 40, 30, 20, 10, 0]);
+        assert_eq!(tilted(&along, &[80, 60, 60, 20, 20, 0]), [80, 66, 50, 30, 13, 0]);
+        assert_eq!(tilted(&along, &[7; 6]), [7; 6]);
     }
 }

@@ -3,9 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::choice::{Choice, Chosen, Why, ids};
-use crate::cost::modules_of;
 use crate::forms::Formed;
-use crate::shares::{Ledger, Limit};
+use crate::shares::{Ledger, Limit, modules_of};
 use crate::strand::Strand;
 use crate::stubs::take_back;
 use crate::tally::{Tally, Way};

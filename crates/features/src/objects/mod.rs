@@ -11,7 +11,6 @@
 //! `roof`, and one with a `base` above 0 hangs in the air. Nothing depends on the order in which objects come.
 
 mod canopy;
-mod clear;
 mod corners;
 mod cut;
 mod grant;
