@@ -23,7 +23,6 @@
 //! assert!(measures.residual.rms_m < 1.0);
 //! ```
 
-mod by_post;
 mod tally;
 pub use tally::{Histogram, Residuals, Sums, Tally};
 mod measure;
@@ -41,15 +40,11 @@ mod triangles;
 pub use triangles::Triangles;
 mod posts;
 pub use posts::{PostHeights, residuals_at_posts, residuals_by_class};
-mod draw;
-pub use draw::Draw;
-mod samples;
 mod sight;
-pub use sight::{EYE_M, LineOfSight, Pair, RANGE_M, drawn_pairs, line_of_sight, sees_on};
+pub use sight::{Draw, EYE_M, LineOfSight, Pair, RANGE_M, drawn_pairs, line_of_sight, sees_on};
+mod samples;
 mod slope;
-pub use slope::{SlopeDifference, slope};
-mod grade;
-pub use grade::{GRADES, SlopeClasses, slope_classes};
+pub use slope::{GRADES, SlopeClasses, SlopeDifference, slope, slope_classes};
 mod hausdorff;
 mod nearest;
 pub use hausdorff::{Distances, Hausdorff, hausdorff};

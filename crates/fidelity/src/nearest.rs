@@ -89,7 +89,7 @@ impl BilinearCell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::draw::Draw;
+    use crate::sight::Draw;
 
     fn point(draw: &mut Draw, size: f64) -> Point {
         [0; 3].map(|_| size * (draw.unit() - 0.5))

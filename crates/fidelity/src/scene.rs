@@ -5,7 +5,7 @@ use terrain::{
 };
 use terrain::{Spacing, Tin, Vertex};
 
-use crate::draw::Draw;
+use crate::sight::Draw;
 
 /// Whole numbers below a bound.
 pub struct Dice(Draw);

@@ -6,7 +6,7 @@ use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use terrain::{LoadModule, ModuleGrid, Post, PostRect, Spacing};
 
 use crate::Tally;
-use crate::by_post::ByPost;
+use crate::measure::ByPost;
 use crate::places::ON_EDGE;
 use crate::tally::{Histogram, Sums};
 

@@ -198,8 +198,8 @@ mod tests {
     use terrain::{LatticePoint, ModuleId, Post, Vertex};
 
     use super::*;
-    use crate::draw::Draw;
     use crate::scene::{grid, height_by_search, module_of, random_tin};
+    use crate::sight::Draw;
 
     fn rect() -> PostRect {
         PostRect::new(Post::new(-7, 30), Post::new(33, 90))
