@@ -6,9 +6,9 @@ use terrain::mesh::Mesh;
 use terrain::{PostRect, StopReason};
 
 use crate::criterion::Criterion;
-use crate::gate::Gate;
 use crate::queue::{Queue, Top};
 use crate::sequence::{Sequence, Witness};
+use crate::start::Gate;
 use crate::task::{Stop, TileTask};
 use crate::weighted_surface::WeightedSurface;
 

@@ -27,19 +27,15 @@ mod task;
 pub use task::{Frame, Proximity, Rule, StartPost, Stop, TileTask};
 mod refine;
 pub use refine::refine;
-mod prefix;
-pub use prefix::prefix;
+mod sequence;
+pub use sequence::prefix;
 mod survey;
 pub use survey::{CostUnit, SurveyTask, survey};
 
 mod batch;
 mod criterion;
-mod gate;
 mod growth;
-mod ladder;
-mod proximity;
 mod queue;
-mod sequence;
 mod start;
 mod weighted_surface;
 

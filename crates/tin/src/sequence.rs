@@ -1,7 +1,8 @@
-//! What happened while a tile was refined: selected posts, refusals, and who wants to know.
+//! What happened while a tile was refined: selected posts, refusals, and who wants to know; and coarser levels, the
+//! first vertices of the sequence.
 
 use terrain::geometry::LocalPost;
-use terrain::{ModuleId, PostRect, Refusal, RefusedBy};
+use terrain::{LatticePoint, ModuleId, PostRect, Refusal, RefusedBy, TileTin, Tin};
 
 /// Told of every post as it is selected, with the gain that selected it.
 pub(crate) trait Witness {
@@ -37,4 +38,18 @@ impl Sequence {
     pub fn refuse(&mut self, tile: PostRect, post: LocalPost, residual: u32, (module, by): (ModuleId, RefusedBy)) {
         self.refused.push(Refusal { post: post.post(tile), module, residual, by });
     }
+}
+
+/// The TIN of the first `points` vertices, or of all where there are fewer: what growing would have been when it had so
+/// many, because a TIN depends on its vertices only, and each was chosen without regard to those after it.
+///
+/// `grown` has its vertices in the order in which they were inserted, corners first, and no edges but Delaunay's.
+///
+/// # Panics
+/// When `points` cut into the vertices that growing began with.
+pub fn prefix(grown: &TileTin, points: usize) -> Tin {
+    assert!(grown.initial_count as usize <= points, "a level holds what its TIN began with");
+    let vertices = grown.tin.vertices[..points.min(grown.tin.vertices.len())].to_vec();
+    let places: Vec<LatticePoint> = vertices.iter().map(|vertex| vertex.at).collect();
+    Tin::new(grown.tin.rect, vertices, terrain::mesh::delaunay(&places))
 }

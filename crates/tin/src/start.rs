@@ -1,10 +1,10 @@
-//! What a tile holds before the first post is selected.
+//! What a tile holds before the first post is selected, and which posts the limits still permit.
 
 use terrain::geometry::{LocalPost, LocalRect};
+use terrain::limits::TileLedger;
 use terrain::mesh::{Lines, Mesh};
-use terrain::{PostRect, Refusal, SeamSides};
+use terrain::{ModuleId, POINT_COST, PostRect, Refusal, RefusedBy, SeamSides};
 
-use crate::gate::Gate;
 use crate::task::{Frame, StartPost, TileTask};
 
 /// A mesh with its first vertices, in their order, and the gate to the next ones.
@@ -88,5 +88,41 @@ pub(crate) fn candidates(rect: PostRect, seams: SeamSides) -> LocalRect {
         west: shut(seams.west),
         north: rect.cells_high() as i32 - shut(seams.north),
         east: rect.cells_wide() as i32 - shut(seams.east),
+    }
+}
+
+/// What stands between a post and the TIN.
+pub(crate) enum Gate {
+    /// Nothing.
+    Open,
+    /// The limits of load modules and windows.
+    Limits(TileLedger),
+}
+
+impl Gate {
+    /// The load module and the limit that refuse `post`, if any do.
+    pub fn refuses(&self, post: LocalPost) -> Option<(ModuleId, RefusedBy)> {
+        let Gate::Limits(ledger) = self else { return None };
+        ledger.refuses(post.row(), post.col())
+    }
+
+    /// Spends what `post` costs.
+    pub fn charge(&mut self, post: LocalPost) {
+        if let Gate::Limits(ledger) = self {
+            ledger.charge(post.row(), post.col());
+        }
+    }
+
+    /// Whether the tile cannot afford one more point.
+    pub fn is_spent(&self) -> bool {
+        matches!(self, Gate::Limits(ledger) if ledger.counts().left() < i64::from(POINT_COST))
+    }
+
+    /// Triangles spent so far.
+    pub fn spent(&self) -> u32 {
+        match self {
+            Gate::Open => 0,
+            Gate::Limits(ledger) => ledger.counts().spent(),
+        }
     }
 }

@@ -11,7 +11,7 @@ use terrain::{
 };
 
 use super::*;
-use crate::proximity::is_near;
+use crate::batch::is_near;
 use crate::{Frame, Proximity};
 
 /// Hills with plateaus: coarse steps, so that equal residuals are common.

@@ -8,7 +8,7 @@
 use terrain::limits::Allowance;
 use terrain::{GainCurve, ModuleId, ModuleRect, POINT_COST, Side};
 
-use crate::tiling::gains::{Gains, highest_rung};
+use crate::tiling::points::{Gains, highest_rung};
 use crate::tiling::{Budget, Tiling};
 
 /// How the area's budget was shared out.

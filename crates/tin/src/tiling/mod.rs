@@ -5,13 +5,9 @@
 
 mod tiling;
 pub use tiling::Tiling;
-mod border;
-pub use border::{outer_border_posts, outer_sides};
 mod budget;
-pub use budget::{Budget, BudgetFault};
-mod gains;
-pub use gains::Gains;
+pub use budget::{Budget, BudgetFault, outer_border_posts, outer_sides};
 mod allocate;
 pub use allocate::{Allocation, Share, allocate_equally, allocate_globally};
 mod points;
-pub use points::{SquaresOfArea, points_equally, points_globally};
+pub use points::{Gains, SquaresOfArea, points_equally, points_globally};

@@ -4,8 +4,6 @@ use std::collections::BTreeSet;
 
 use terrain::GainCurve;
 
-use crate::tiling::gains::{Gains, highest_rung};
-
 /// `points` shared equally; the remainder goes to the first tiles in row-major order.
 pub fn points_equally(points: u64, tiles: usize) -> Vec<usize> {
     let (each, rest) = (points as usize / tiles, points as usize % tiles);
@@ -72,11 +70,29 @@ impl SquaresOfArea {
     }
 }
 
+/// What the surveys say, the best first.
+///
+/// The curves of a large area do not fit into memory together, so they come in bands: each holds one curve per tile,
+/// row-major, with all its runs on some steps of the ladder, which are higher than those of the next band. A band is
+/// asked for when all before it have been taken.
+pub struct Gains<'a> {
+    /// The bands; costs in triangles, or in points where points are shared out.
+    pub bands: &'a mut dyn Iterator<Item = Vec<GainCurve>>,
+    /// Tiles from the lowest rank, by row-major place.
+    pub by_rank: &'a [usize],
+    /// Gains below this step of the ladder are not wanted: the RMS residual asked for is reached without them.
+    pub floor: Option<i32>,
+}
+
+/// The highest rung among the next runs of all curves.
+pub(crate) fn highest_rung(curves: &[GainCurve], next: &[usize]) -> Option<i32> {
+    curves.iter().zip(next).filter_map(|(curve, &at)| Some(curve.runs.get(at)?.bin)).max()
+}
+
 #[cfg(test)]
 mod tests {
-    use std::iter::once;
-
     use super::*;
+    use std::iter::once;
     use terrain::{GainRun, ModuleId, TileId};
 
     fn curve(col: u32, bins: &[i32]) -> GainCurve {
