@@ -12,8 +12,8 @@
 //! arithmetic of limits beyond their ranges (whether they can be met is `plan`'s).
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
-mod named_file;
-pub use named_file::NamedFile;
+mod spec;
+pub use spec::{GeoidSpec, LodSpec, NamedFile, ObjectSource, ObjectsSpec, Start, StartMethod, WaterSpec};
 mod model;
 pub use model::{
     Allocation, Area, Borders, Budget, ClipHeights, Count, DemSource, DemSpec, Edges, ErrorKey, Job, LimitsSpec,
@@ -27,19 +27,11 @@ mod importance;
 pub use importance::{AreaShape, HOLE_CLASS_NAME, ImportanceArea, ImportanceSpec, SampleClass};
 mod features_spec;
 pub use features_spec::{FeatureSource, FeaturesSpec, HeightsFrom};
-mod objects_spec;
-pub use objects_spec::{ObjectSource, ObjectsSpec};
-mod ground;
-pub use ground::{GeoidSpec, WaterSpec};
-mod lod;
-pub use lod::LodSpec;
 mod remote;
 pub use remote::{check_address, is_remote, without_query};
 mod fetched;
 mod lock;
 pub use lock::{Lock, Locked};
-mod given;
-pub use given::{Start, StartMethod};
 mod find;
 pub use find::{AreaFound, AreaPlace, AreaRequest, FindArea, NoArea};
 mod error;
@@ -63,4 +55,3 @@ pub use setting_list::Setting;
 mod settings;
 pub use settings::deciding_lines;
 mod settings_features;
-mod settings_objects;

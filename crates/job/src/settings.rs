@@ -8,7 +8,7 @@ use terrain::{MaterialName, THOUSANDTHS, metres_of_quanta};
 use crate::setting_list::{List, Setting, counted, number, quoted};
 use crate::{
     AreaShape, Budget, Choice, DemSource, Edges, GeoidSpec, ImportanceArea, Job, LodSpec, Method, Optimising,
-    Resampling, Sight, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features, settings_objects,
+    Resampling, Sight, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features,
 };
 
 /// What `load_modules.format` usually is.
@@ -29,7 +29,7 @@ impl Job {
         self.describe_dem(&mut list);
         self.describe_importance(&mut list);
         self.features.iter().for_each(|features| settings_features::describe(features, &mut list));
-        self.objects.iter().for_each(|objects| settings_objects::describe(objects, &mut list));
+        self.objects.iter().for_each(|objects| settings_features::describe_objects(objects, &mut list));
         self.describe_tiles(&mut list);
         self.describe_modules(&mut list);
         self.describe_limits(&mut list);

@@ -2,23 +2,24 @@
 
 mod area;
 mod dem;
-mod exports;
 mod features;
-mod given;
 mod importance;
-mod limits;
-mod lod;
 mod objects;
-mod tiles;
 mod tin;
 
 use std::path::Path;
 
+use terrain::{MaterialName, ModuleGrid, OBJECT_MATERIALS};
 use toml::de::DeTable;
 
-use crate::entry::{Document, Section, check_sections};
+use crate::bounds::{COARSER_LEVELS_MAX, MODULES_PER_TILE_MIN, TILES_MAX, WINDOW_M};
+use crate::entry::{Document, Entry, Section, check_sections, in_32_bits};
 use crate::files::Mention;
-use crate::{AreaPlace, DemSource, FindArea, Job, JobError, NoArea, SourceFile, files, is_remote};
+use crate::keys::nearest;
+use crate::{
+    AreaPlace, DemSource, Fault, FeaturesSpec, FindArea, Job, JobError, LimitsSpec, LodSpec, NoArea, SourceFile,
+    TilesSpec, WindowLimit, files, is_remote,
+};
 
 /// The sections of a job file, their keys known.
 struct Sections<'a> {
@@ -85,17 +86,17 @@ fn job_of(sections: &Sections, path: &Path, find: Option<&FindArea>) -> Result<(
     let features = features::read(&sections.features, &dem.source, &importance, path, &mut mentions)?;
     let objects = objects::read(&sections.objects, features.as_ref(), path, &mut mentions)?;
     objects::refuse_beside(&sections.objects, &sections.modules, modules.edges, modules.format)?;
-    let tiles = tiles::read(&sections.tiles, &area.grid)?;
-    let limits = limits::read(&sections.limits, &area.grid, modules.side_m)?;
-    let given = given::read(&sections.tin, path, &mut mentions)?;
+    let tiles = read_tiles(&sections.tiles, &area.grid)?;
+    let limits = read_limits(&sections.limits, &area.grid, modules.side_m)?;
+    let given = tin::given_points(&sections.tin, path, &mut mentions)?;
     let tin = tin::read(&sections.tin, &sections.modules, modules.edges, given)?;
     let others = [&sections.dem, &sections.modules, &sections.tin];
     features::refuse_beside(&sections.features, others, modules.edges, tin.method.name())?;
     modules.outer_border = area::outer_border(&sections.modules, modules.edges, tin.method)?;
-    let lod = lod::read(&sections.lod, features.as_ref())?;
+    let lod = read_lod(&sections.lod, features.as_ref())?;
     let (path, materials) = (path.to_owned(), Vec::new());
     let mut job = Job { path, area, dem, importance, features, objects, tiles, modules, limits, tin, lod, materials };
-    job.materials = exports::read(&sections.exports, &job.class_names())?;
+    job.materials = read_exports(&sections.exports, &job.class_names())?;
     Ok((job, mentions))
 }
 
@@ -122,4 +123,136 @@ fn syntax(document: Document, error: &toml::de::Error) -> JobError {
     let column = 1 + before.chars().rev().take_while(|c| *c != '\n').count();
     let message = error.message().lines().next().unwrap_or("unreadable").to_owned();
     JobError::Syntax { path: document.path.to_owned(), line: 1 + before.matches('\n').count(), column, message }
+}
+
+/// Names of materials; `classes` are the job's.
+fn read_exports(exports: &Section, classes: &[String]) -> Result<Vec<MaterialName>, JobError> {
+    let Some(entry) = exports.optional("materials") else { return Ok(Vec::new()) };
+    let known: Vec<&str> = classes.iter().map(String::as_str).chain(OBJECT_MATERIALS).collect();
+    let material = |(of, entry): (String, Entry)| {
+        if !known.contains(&of.as_str()) {
+            let hint = match nearest(&of, &known) {
+                Some(name) => format!("did you mean \"{name}\"?"),
+                None => format!("they are {}", known.join(", ")),
+            };
+            let found = "a material that nothing is of".to_owned();
+            let fault = entry.fault("the name of a class, or of a material of objects");
+            return Err(JobError::UnknownKey(Box::new(Fault { found, hint, ..*fault })));
+        }
+        let table = if entry.is_table() { Some(entry.table()?) } else { None };
+        let name = match &table {
+            Some(table) => table.required("name")?,
+            None => entry,
+        };
+        let code = |key: &str| -> Result<Option<u16>, JobError> {
+            let entry = table.as_ref().and_then(|table| table.optional(key));
+            entry.map(|entry| entry.whole().map(|code| code as u16)).transpose()
+        };
+        let (surface_code, feature_id) = (code("surface_code")?, code("feature_id")?);
+        Ok(MaterialName { of, name: name.name("formats have room for no other names")?, surface_code, feature_id })
+    };
+    entry.items()?.into_iter().map(material).collect()
+}
+
+fn read_limits(limits: &Section, grid: &ModuleGrid, side_m: f64) -> Result<LimitsSpec, JobError> {
+    // Where 4 km is no whole number of load modules the window is the next larger one: what holds there holds in it.
+    let side = (WINDOW_M / side_m).ceil() as u32;
+    let window = WindowLimit {
+        limit: limits.whole_u32("per_4km_square")?,
+        rows: side.min(grid.rows),
+        cols: side.min(grid.cols),
+    };
+    Ok(LimitsSpec {
+        count: limits.word("count")?,
+        per_load_module: limits.whole_u32("per_load_module")?,
+        pool: limits.whole("pool")?,
+        mean_per_load_module: limits.number("mean_per_load_module")?,
+        window,
+    })
+}
+
+fn read_tiles(tiles: &Section, grid: &ModuleGrid) -> Result<TilesSpec, JobError> {
+    let rows = along(tiles, "rows", grid.rows)?;
+    let columns = along(tiles, "columns", grid.cols)?;
+    if let Some(entry) = tiles.optional("rows").or_else(|| tiles.optional("columns"))
+        && TILES_MAX < u64::from(rows) * u64::from(columns)
+    {
+        return Err(entry.out_of_range(format!("at most {TILES_MAX} tiles, rows times columns")));
+    }
+    match tiles.optional("borders") {
+        Some(entry) if entry.text()? == "line" => {
+            Err(entry.unsupported(&entry.expected(), "\"inherit\" is the usual one"))
+        }
+        _ => Ok(TilesSpec { rows, columns, order: tiles.word("order")?, borders: tiles.word("borders")? }),
+    }
+}
+
+/// How many tiles there are along one side of the area: as the job says, or the usual number, fewer where they
+/// would be too narrow.
+fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
+    let most = (modules / MODULES_PER_TILE_MIN).max(1);
+    match tiles.optional(key) {
+        Some(entry) => entry
+            .whole_in(&(1..=most.into()), &format!("tiles of {modules} load modules, at least two each"))
+            .map(in_32_bits),
+        None => tiles.whole_u32(key).map(|usual| usual.min(most)),
+    }
+}
+
+fn read_lod(lod: &Section, features: Option<&FeaturesSpec>) -> Result<LodSpec, JobError> {
+    let inner_shares = lod.maybe("levels", inner_shares)?.unwrap_or_default();
+    let border = match lod.optional("border") {
+        Some(entry) if inner_shares.is_empty() => {
+            let hint = "it says what coarser levels keep of the sides: add levels, or leave it out";
+            return Err(entry.conflict("no levels", "a job without this key", hint));
+        }
+        _ => lod.word("border")?,
+    };
+    let leave_out = match lod.optional("levels") {
+        Some(entry) => entry.list()?.iter().map(|level| leave_out(level, features)).collect::<Result<_, _>>()?,
+        None => Vec::new(),
+    };
+    Ok(LodSpec { inner_shares, border, leave_out })
+}
+
+/// Classes of features that a level leaves out.
+fn leave_out(level: &Entry, features: Option<&FeaturesSpec>) -> Result<Vec<String>, JobError> {
+    let Some(entry) = level.table()?.optional("leave_out") else { return Ok(Vec::new()) };
+    let Some(features) = features else {
+        let hint = "remove it, or name files of roads and water in [features]";
+        return Err(entry.conflict("no [features]", "a job with roads and water", hint));
+    };
+    let known = features.classes();
+    let mut classes = Vec::new();
+    for item in entry.list()? {
+        let name = item.text()?;
+        if !known.iter().any(|class| class == name) {
+            let hint = format!("they are {}", known.join(", "));
+            return Err(item.out_of_range_with("a class of features", hint));
+        }
+        classes.push(name.to_owned());
+    }
+    Ok(classes)
+}
+
+fn inner_shares(levels: &Entry) -> Result<Vec<f64>, JobError> {
+    let entries = levels.list()?;
+    if COARSER_LEVELS_MAX < entries.len() {
+        let hint = "the finest level is always there and is not listed";
+        return Err(levels.out_of_range_with(levels.expected(), hint));
+    }
+    let mut shares: Vec<f64> = Vec::new();
+    for entry in entries {
+        let share = entry.table()?.required("inner_share")?;
+        let number = share.number()?;
+        if number <= 0.0 || 1.0 <= number {
+            return Err(share.out_of_range(share.expected()));
+        }
+        if let Some(&finer) = shares.last().filter(|&&finer| finer <= number) {
+            let expected = format!("less than {finer}, the share of the level before");
+            return Err(share.out_of_range_with(expected, "levels go from fine to coarse"));
+        }
+        shares.push(number);
+    }
+    Ok(shares)
 }

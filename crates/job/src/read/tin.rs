@@ -1,14 +1,17 @@
-//! `[tin]`: how posts are chosen.
+//! `[tin]`: how posts are chosen, and points that a job gives: `tin.start` and `tin.pins`.
 //!
 //! Which keys may stand there depends on the method; a key that the method would ignore is refused.
+
+use std::path::Path;
 
 use terrain::QUANTA_PER_METRE;
 
 use crate::bounds::{EYE_M, QUANTUM_M_MAX, RESIDUAL_M_MAX};
 use crate::entry::{Entry, Section};
+use crate::files::{Mention, Place};
 use crate::{
     Allocation, Budget, Choice, Edges, Effort, ErrorKey, JobError, Method, MethodName, NamedFile, Optimising,
-    Proximity, Sight, Start, TinSpec, keys,
+    Proximity, Sight, Start, StartMethod, TinSpec, keys,
 };
 
 pub(super) fn read(
@@ -176,4 +179,40 @@ fn proximity(tin: &Section) -> Result<Option<Proximity>, JobError> {
             }
         }
     }
+}
+
+pub(super) fn given_points(
+    tin: &Section,
+    job: &Path,
+    mentions: &mut Vec<Mention>,
+) -> Result<(Option<Start>, Option<NamedFile>), JobError> {
+    let start = tin.maybe("start", |entry| start(entry, job, mentions))?;
+    let pins = tin.maybe("pins", |entry| file(entry, job, Place::Pins, mentions))?;
+    Ok((start, pins))
+}
+
+fn file(entry: &Entry, job: &Path, place: Place, mentions: &mut Vec<Mention>) -> Result<NamedFile, JobError> {
+    mentions.push(Mention { place, fault: entry.fault("a file") });
+    entry.file(job)
+}
+
+fn start(entry: &Entry, job: &Path, mentions: &mut Vec<Mention>) -> Result<Start, JobError> {
+    if !entry.is_table() {
+        return file(entry, job, Place::Start, mentions).map(Start::File);
+    }
+    let table = entry.table()?;
+    let method = table.required("method")?.word()?;
+    let points = match (method, table.optional("points")) {
+        (StartMethod::HighLow, None) => None,
+        (StartMethod::HighLow, Some(points)) => {
+            let hint = "it takes all peaks and pits: leave points out";
+            return Err(points.conflict("method = \"highlow\"", "no number, which is the ground's choice", hint));
+        }
+        (_, None) => {
+            let hint = "points = 1000: so many in the whole area";
+            return Err(table.missing("points", "a number of points to start from", hint));
+        }
+        (_, Some(points)) => Some(points.whole()?),
+    };
+    Ok(Start::Method { method, points })
 }
