@@ -11,7 +11,6 @@ pub use against::leading;
 mod map_files;
 pub use map_files::{BreachPlaces, breaches_csv, breaches_geojson, features_geojson, outcome};
 mod features_text;
-mod objects_text;
 pub use features_text::{far_off_in_words, remarks_in_words};
 mod certificate;
 mod page;

@@ -6,9 +6,8 @@ use store::{
     ReportResidual, ReportStage,
 };
 
-use crate::against::{self, Residual};
+use crate::against::{self, Residual, objects_text};
 use crate::features_text::features_text;
-use crate::objects_text::objects_text;
 use crate::table::{Align, Table, fold, grouped};
 
 use Align::{Left, Right};

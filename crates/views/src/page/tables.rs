@@ -5,11 +5,10 @@ use store::{Manifest, Report, ReportEarthworks, ReportFeatures, ReportObjectLimi
 
 use super::advise;
 use super::marks::{BOUND_ROWS_MAX, Marks, ROWS_MAX};
-use crate::against::{Residual, WORKING, told};
+use crate::against::{Residual, WORKING, objects_row, told};
 use crate::features_text::{
     amounts, check_rows, clearances_in_words, cost, earthwork, is_thin, kept, remarks_in_words,
 };
-use crate::objects_text::objects_row;
 use crate::report::{amount, border_in_words, bound_cells, breach_cells, decimals, eta_of, heights_in_words};
 use crate::table::grouped;
 

@@ -8,7 +8,6 @@
 //! Pictures are pure: the same ground gives the same bytes, on any machine. What is absent: threads, files, clocks.
 
 mod camera;
-mod closeup;
 mod color;
 mod depth;
 mod errors;
@@ -32,7 +31,6 @@ mod text;
 mod wireframe;
 
 pub use camera::Camera;
-pub(crate) use closeup::module_pictures;
 pub use color::{Color, palette};
 pub(crate) use color::{GREY, NOTHING, hex};
 pub use errors::{draw_errors, draw_module_limits};
@@ -46,6 +44,7 @@ pub use scene::{NO_RESIDUAL, Scene, SceneFeatures, SceneGround, SceneLimits, Sce
 pub use seen::{SeenGround, draw_seen};
 pub(crate) use sheet::{Drawing, Key, Legend, length_text, round_length};
 pub use sight::{Eye, Sight, draw_sight};
+pub(crate) use wireframe::module_pictures;
 
 /// A map of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]

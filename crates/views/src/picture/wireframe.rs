@@ -1,12 +1,16 @@
-//! Edges of triangles seen from above, over a faint relief.
+//! Edges of triangles seen from above, over a faint relief; one load module alone, for lists of many.
 
+use terrain::{LoadModule, ModuleRect};
+
+use super::RESIDUAL_SCALE_M;
 use super::color::{INK, WHITE, mix};
 use super::facets::Facets;
 use super::image::Image;
-use super::map_extent::MapExtent;
+use super::map_extent::{MapExtent, Posts};
 use super::module_maps::density;
 use super::relief::{Tints, facets_relief};
-use super::scene::Scene;
+use super::residual_map::residual_map;
+use super::scene::{Scene, SceneGround};
 use super::sheet::{Drawing, Key, Legend, Sheet};
 
 /// The edges of triangles, as strong as there is room for them.
@@ -58,14 +62,36 @@ pub(crate) fn wireframe(scene: &Scene, longest: usize) -> Drawing {
     Drawing { sheet, map, map_extent }
 }
 
+/// The wireframe of a load module and its residuals, where the scene has its ground.
+pub(crate) fn module_pictures(scene: &Scene, module: &LoadModule, pixels: usize) -> (Image, Option<Image>) {
+    let (row, col) = (module.id.row, module.id.col);
+    let extent_m = scene.extent_m(ModuleRect { south: row, west: col, north: row + 1, east: col + 1 });
+    let map_extent = MapExtent::of(extent_m, pixels);
+    let wires = facets_wireframe(
+        &Facets::of_modules([module], scene.grid, scene.frame.spacing).with_covers_of(scene, [module]),
+        &map_extent,
+    );
+    let residuals = scene.ground.map(|ground| {
+        let (rect, whole) = (scene.grid.posts_of(module.id), ground.dem.rect());
+        let dem = ground.dem.window(rect);
+        let line = |row: i32| {
+            let start = (row - whole.south) as usize * whole.posts_wide() + (rect.west - whole.west) as usize;
+            &ground.residuals[start..start + rect.posts_wide()]
+        };
+        let residuals: Vec<i32> = (rect.south..=rect.north).flat_map(line).copied().collect();
+        let posts = Posts { rect, spacing_m: [scene.frame.spacing.metres(); 2] };
+        residual_map(&SceneGround { dem: &dem, residuals: &residuals }, &posts, &map_extent, RESIDUAL_SCALE_M)
+    });
+    (wires, residuals)
+}
+
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, LoadModule, ModuleVertex};
-
     use super::super::relief::{Shown, relief};
     use super::super::scene::SceneLimits;
     use super::*;
     use crate::samples;
+    use terrain::{Decks, LoadModule, ModuleVertex};
 
     #[test]
     fn a_caption_counts_the_triangles_of_bridges_as_the_report_does() {
