@@ -1,4 +1,5 @@
-//! What is a folder of many files as one file: 3D Tiles as an archive (3TZ), quantized-mesh in SQLite (MBTiles).
+//! What is a folder of many files as one file: 3D Tiles as an archive (3TZ), quantized-mesh and maps in SQLite
+//! (MBTiles).
 
 use std::collections::BTreeMap;
 use std::io::{Cursor, Write};
@@ -6,11 +7,11 @@ use std::path::Path;
 use std::sync::Mutex;
 
 use md5::{Digest, Md5};
+use rusqlite::{Connection, params};
 use serde_json::Value;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
-use crate::mbtiles::write_tables;
 use crate::{Datum, ExportError, Product, Put, Work, write_quantized_mesh};
 
 /// The last file of a 3TZ: where every other begins, by the MD5 sum of its name (3D Tiles Archive Format 1.3).
@@ -118,6 +119,41 @@ fn tile_numbers(name: &str) -> Option<[i64; 3]> {
     let mut parts = name.strip_suffix(".terrain")?.split('/').map(str::parse);
     let numbers = [parts.next()?.ok()?, parts.next()?.ok()?, parts.next()?.ok()?];
     parts.next().is_none().then_some(numbers)
+}
+
+/// Writes tiles, each by its level, column and row counted from the south, and what is said of them at `path`.
+///
+/// # Errors
+/// When the file cannot be written.
+pub(crate) fn write_tables<'a>(
+    path: &Path,
+    about: &[(&str, String)],
+    tiles: impl Iterator<Item = ([i64; 3], &'a [u8])>,
+) -> Result<(), ExportError> {
+    tables(path, about, tiles).map_err(|error| ExportError::write("MBTiles")(std::io::Error::other(error)))
+}
+
+fn tables<'a>(
+    path: &Path,
+    about: &[(&str, String)],
+    tiles: impl Iterator<Item = ([i64; 3], &'a [u8])>,
+) -> rusqlite::Result<()> {
+    let mut connection = Connection::open(path)?;
+    // The file has a temporary name until it is whole, so nothing has to survive a crash.
+    connection.execute_batch(
+        "PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF; PRAGMA application_id = 0x4d504258;
+        CREATE TABLE metadata (name TEXT PRIMARY KEY, value TEXT);
+        CREATE TABLE tiles (zoom_level INTEGER, tile_column INTEGER, tile_row INTEGER, tile_data BLOB);",
+    )?;
+    let transaction = connection.transaction()?;
+    for ([level, column, row], bytes) in tiles {
+        transaction.execute("INSERT INTO tiles VALUES (?1, ?2, ?3, ?4)", params![level, column, row, bytes])?;
+    }
+    for (name, value) in about {
+        transaction.execute("INSERT INTO metadata VALUES (?1, ?2)", params![name, value])?;
+    }
+    transaction.execute_batch("CREATE UNIQUE INDEX tile_index ON tiles (zoom_level, tile_column, tile_row);")?;
+    transaction.commit()
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! GeoTIFF: 32-bit floats in deflated blocks with the predictor for floats, placed by GeoKeys, with coarser images of
-//! the same ground, so that a viewer of the whole does not read the whole.
+//! the same ground, so that a viewer of the whole does not read the whole; and rasters of bytes, such as what is seen.
 
-use std::io::Write;
+use std::io::{self, Seek, Write};
 
 use source_files::geotiff_parts::{VERTICAL_UNIT, projected_keys, scale_and_tie_point};
-use source_files::plain_datum;
-use terrain::PostRect;
+use source_files::{plain_datum, write_bytes};
+use terrain::{GridFrame, PostRect, Spacing};
 
 use crate::blocks::{BLOCK, Blocks};
 use crate::tiff_layout::{self, Image, Value, tag};
@@ -133,16 +133,50 @@ fn vertical_code(datum: &str) -> Option<u16> {
     VERTICAL_CODES.iter().find(|(name, code)| plain == *name || plain == format!("epsg{code}")).map(|(_, code)| *code)
 }
 
+/// Where the numbers lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ByteRaster {
+    /// Easting and northing of the south-western place.
+    pub origin_m: [f64; 2],
+    /// Between neighbouring places.
+    pub spacing: Spacing,
+    /// Places across and up.
+    pub size: [usize; 2],
+    /// The coordinate system, EPSG:this.
+    pub epsg: u16,
+    /// Numbers at each place.
+    pub bands: u16,
+}
+
+/// Writes the numbers. `rows` is asked for one band of rows after another, by the first and the last of them counted
+/// from the north, and gives their numbers row by row from the north, those of a place one behind
+/// the other.
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_byte_raster(
+    out: &mut (impl Write + Seek),
+    raster: &ByteRaster,
+    mut rows: impl FnMut(usize, usize) -> Vec<u8>,
+) -> io::Result<()> {
+    let ByteRaster { origin_m: [origin_east_m, origin_north_m], spacing, size: [wide, high], epsg, bands } = *raster;
+    let frame = GridFrame { origin_east_m, origin_north_m, spacing };
+    write_bytes(out, &frame, PostRect::of_size(high, wide), epsg, bands, |band| {
+        let from_north = |row: i32| high - 1 - row as usize;
+        let numbers = rows(from_north(band.north), from_north(band.south));
+        // The writer takes them from the south.
+        numbers.rchunks(usize::from(bands) * wide).flatten().copied().collect()
+    })
+}
+
 #[cfg(test)]
 mod tests {
-    use std::io::Cursor;
-
-    use tiff::decoder::{Decoder, DecodingResult};
-    use tiff::tags::Tag;
-
     use super::*;
     use crate::blocks::{Raster, blocks};
     use crate::samples;
+    use std::io::Cursor;
+    use tiff::decoder::{Decoder, DecodingResult};
+    use tiff::tags::Tag;
 
     fn image(raster: &Raster) -> Blocks {
         Blocks { wide: raster.wide, high: raster.high(), blocks: blocks(raster) }

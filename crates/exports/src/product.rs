@@ -6,12 +6,11 @@ use std::sync::Arc;
 
 use store::{Folder, Manifest, TileModules};
 use terrain::{
-    GridFrame, HOLE_CLASS, LoadModule, MaterialName, ModuleGrid, ModuleId, ModuleLine, ModuleRect, OBJECT_MATERIALS,
-    TileId,
+    GridFrame, HOLE_CLASS, LineForm, LineKind, LoadModule, MaterialName, ModuleGrid, ModuleId, ModuleLine, ModuleRect,
+    OBJECT_MATERIALS, QUANTA_PER_METRE, TileId,
 };
 
 use crate::classes::{Classes, names_in, water_in};
-use crate::ribbon_lines::length_m;
 use crate::textures::{Place, Texture, Textures};
 use crate::{ExportError, Work};
 
@@ -329,4 +328,20 @@ fn rect_of(manifest: &Manifest, block: Option<Block>) -> Result<ModuleRect, Expo
         expected: format!("load modules from 0,0 to {},{}", rows.saturating_sub(1), cols.saturating_sub(1)),
         hint: "name the south-west one first, then the north-east one, each as ROW,COL".into(),
     })
+}
+
+/// Whether a way is seen as a band: what is in the ground as a line, and has a width.
+pub(crate) fn is_band(line: &ModuleLine) -> bool {
+    let traits = &line.traits;
+    traits.is_in_ground && traits.form == LineForm::Line && traits.kind != LineKind::Breakline && 0 < traits.width
+}
+
+/// The length of all of them.
+fn length_m(lines: &[Vec<ModuleLine>]) -> f64 {
+    let all = lines.iter().flatten().filter(|line| is_band(line)).flat_map(|line| line.vertices.windows(2));
+    let part = |pair: &[terrain::ModuleVertex]| {
+        let [east, north] = [[pair[0].x, pair[1].x], [pair[0].y, pair[1].y]].map(|[a, b]| f64::from(b) - f64::from(a));
+        east.hypot(north)
+    };
+    all.map(part).sum::<f64>() / f64::from(QUANTA_PER_METRE)
 }

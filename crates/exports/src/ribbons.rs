@@ -10,7 +10,7 @@ use terrain::{Draped, Flat, HOLE_CLASS, LineKind, ModuleId, ModuleLine};
 
 use crate::Product;
 use crate::objects::Facet;
-use crate::ribbon_lines::is_band;
+use crate::product::is_band;
 
 /// How far a ribbon lies above the ground, in quanta: 5 cm, to the next whole one.
 pub(crate) const RIBBON_UP: i32 = 6;

@@ -6,7 +6,6 @@
 //! the posts of the working grid. Each has the height of the compiled surface at its place; over holes, where no source
 //! has a height, that of the triangles which close them.
 
-mod engine;
 mod placements;
 mod samples;
 
@@ -16,7 +15,7 @@ use terrain::HOLE_CLASS;
 use crate::classes::HOLE_NAME;
 use crate::sheets::Material;
 use crate::{ExportError, Product, Put, Sheet, Work, textures};
-pub use engine::Engine;
+pub use placements::Engine;
 use placements::placements;
 use samples::{Off, Samples};
 

@@ -7,28 +7,25 @@
 
 mod clip;
 mod collar;
-mod extensions;
-mod holes;
 mod lattice;
-mod slivers;
 mod tile;
+pub(crate) use tile::Tile;
 
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
+use terrain::HOLE_CLASS;
 
 use crate::earth::{Earth, directions, earth_centred};
 use crate::globe::Globe;
 use crate::mesh::{Mesh, cross, minus, unit};
+use crate::quantized::clip::{GONE, right, weld};
+use crate::quantized::collar::{GlobeMesh, with_collar};
+use crate::quantized::lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
+use crate::quantized::tile::{CELLS, WaterMask};
 use crate::triangle_index::TriangleIndex;
 use crate::{Datum, ExportError, Product, Put, Work};
-use collar::{GlobeMesh, with_collar};
-use extensions::{CELLS, WaterMask};
-use holes::holes;
-use lattice::{Node, STEPS, height_steps, lon_lat, steps, tiles};
-use slivers::{GONE, right, weld};
-pub(crate) use tile::Tile;
 
 /// Load modules along a tile of the finest level, about.
 const MODULES_PER_TILE: f64 = 5.0;
@@ -414,6 +411,24 @@ fn collar_m(product: &Product, earth: &Earth, bounds: &Bounds, level: u32) -> Re
         }
     }
     Ok(collar_m)
+}
+
+/// The triangles over holes, as longitudes and latitudes; `None` without any.
+fn holes(mesh: &Mesh, globe: &Globe) -> Option<Value> {
+    let triangles = mesh.triangles.iter().zip(&mesh.classes).filter(|(_, class)| **class == HOLE_CLASS);
+    let polygons: Vec<Value> = triangles
+        .map(|(&[a, b, c], _)| {
+            let ring = [a, b, c, a].map(|v| globe.lon_lat[v as usize]);
+            json!([ring])
+        })
+        .collect();
+    let geometry = || json!({ "type": "MultiPolygon", "coordinates": polygons });
+    (!polygons.is_empty()).then(|| {
+        json!({
+            "type": "FeatureCollection",
+            "features": [{ "type": "Feature", "properties": { "class": "hole" }, "geometry": geometry() }],
+        })
+    })
 }
 
 #[cfg(test)]

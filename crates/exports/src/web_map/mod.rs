@@ -3,10 +3,10 @@
 //! A pixel has the height of the triangle under its middle, at every level; heights stay above the datum of the
 //! database. Around what is exported, and over holes, a pixel has the height 0 m, as maps draw places without tiles:
 //! browsers lose the colours of transparent pixels. A tile without any ground is left out.
+//!
+//! Web mercator is the world as a square from 0 to 1, x east from 180 degrees west, y south from the northern border.
 
-mod encoding;
-mod mercator;
-
+use std::f64::consts::PI;
 use std::io::{Seek, Write};
 use std::path::Path;
 
@@ -14,13 +14,11 @@ use pmtiles::{PmTilesWriter, PmtResult, TileCoord, TileId, TileType};
 use serde_json::{Value, json};
 use terrain::HOLE_CLASS;
 
+use crate::archives::write_tables;
 use crate::earth::Earth;
-use crate::mbtiles::write_tables;
 use crate::textures::png_of;
 use crate::triangle_index::TriangleIndex;
 use crate::{Datum, ExportError, Product, Work};
-pub use encoding::HeightEncoding;
-use mercator::{Extent, LATITUDE_MAX, lon_lat};
 
 /// Height of pixels outside of what is exported and over holes, in metres.
 const OUTSIDE_M: f64 = 0.0;
@@ -210,6 +208,115 @@ impl<'a> Pyramid<'a> {
 
 fn coord(square: Square) -> PmtResult<TileCoord> {
     TileCoord::new(square.level as u8, square.col, square.row)
+}
+
+/// Latitude of the northern border in degrees.
+const LATITUDE_MAX: f64 = 85.051_128_779_806_59;
+/// Metres around the equator, as web mercator has it.
+const AROUND_M: f64 = 2.0 * PI * 6_378_137.0;
+
+/// The place of a longitude and latitude in degrees.
+fn on_map([longitude, latitude]: [f64; 2]) -> [f64; 2] {
+    [(longitude + 180.0) / 360.0, (1.0 - latitude.to_radians().tan().asinh() / PI) / 2.0]
+}
+
+/// Longitude and latitude in degrees of a place.
+fn lon_lat([x, y]: [f64; 2]) -> [f64; 2] {
+    [x * 360.0 - 180.0, (PI * (1.0 - 2.0 * y)).sinh().atan().to_degrees()]
+}
+
+/// Places along the sides of a product.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Extent {
+    /// Of the north-western corner.
+    pub low: [f64; 2],
+    /// Of the south-eastern corner.
+    pub high: [f64; 2],
+}
+
+impl Extent {
+    /// That of longitudes and latitudes.
+    pub(crate) fn of(lon_lats: &[[f64; 2]]) -> Self {
+        let places: Vec<[f64; 2]> = lon_lats.iter().map(|&of| on_map(of)).collect();
+        let end =
+            |axis: usize, start: f64, of: fn(f64, f64) -> f64| places.iter().map(|place| place[axis]).fold(start, of);
+        Self {
+            low: [0, 1].map(|axis| end(axis, f64::INFINITY, f64::min)),
+            high: [0, 1].map(|axis| end(axis, f64::NEG_INFINITY, f64::max)),
+        }
+    }
+
+    /// West, south, east and north in degrees.
+    pub(crate) fn degrees(&self) -> [f64; 4] {
+        let ([west, north], [east, south]) = (lon_lat(self.low), lon_lat(self.high));
+        [west, south, east, north]
+    }
+
+    /// The first level at which no pixel of tiles with so many on a side is larger than `pixel_m`.
+    pub(crate) fn finest_level(&self, pixels: usize, pixel_m: f64) -> u32 {
+        const LEVEL_MAX: f64 = 22.0;
+        let [_, south, _, north] = self.degrees();
+        let latitude = if south < 0.0 && 0.0 < north { 0.0 } else { south.abs().min(north.abs()) };
+        let tiles = AROUND_M * latitude.to_radians().cos() / (pixels as f64 * pixel_m);
+        tiles.log2().ceil().clamp(0.0, LEVEL_MAX) as u32
+    }
+
+    /// The last level at which it is no wider and higher than a tile, and no finer than `finest`.
+    pub(crate) fn coarsest_level(&self, finest: u32) -> u32 {
+        let side = (self.high[0] - self.low[0]).max(self.high[1] - self.low[1]);
+        (1.0 / side).log2().floor().clamp(0.0, f64::from(finest)) as u32
+    }
+
+    /// Columns and rows of the tiles of a level that it meets.
+    pub(crate) fn tiles(&self, level: u32) -> [std::ops::RangeInclusive<u32>; 2] {
+        let count = 1_u32 << level;
+        let tile = |place: f64| ((place * f64::from(count)) as u32).min(count - 1);
+        [0, 1].map(|axis| tile(self.low[axis])..=tile(self.high[axis]))
+    }
+}
+
+/// How a height becomes red, green and blue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum HeightEncoding {
+    /// Mapbox Terrain-RGB: tenths of a metre above -10,000 m.
+    Mapbox,
+    /// Terrarium: 256ths of a metre above -32,768 m.
+    Terrarium,
+}
+
+impl HeightEncoding {
+    /// What programs call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mapbox => "mapbox",
+            Self::Terrarium => "terrarium",
+        }
+    }
+
+    /// How a reader gets the height back.
+    pub(crate) fn formula(self) -> &'static str {
+        match self {
+            Self::Mapbox => "height = -10000 + 0.1 * (65536 * red + 256 * green + blue)",
+            Self::Terrarium => "height = 256 * red + green + blue / 256 - 32768",
+        }
+    }
+
+    /// The lowest height, and steps to a metre.
+    fn scale(self) -> (f64, f64) {
+        match self {
+            Self::Mapbox => (-10_000.0, 10.0),
+            Self::Terrarium => (-32_768.0, 256.0),
+        }
+    }
+
+    /// Red, green and blue of the step next to a height in metres.
+    pub(crate) fn color(self, height_m: f64) -> [u8; 3] {
+        const STEPS_MAX: f64 = 16_777_215.0;
+        let (lowest_m, steps_per_m) = self.scale();
+        let step = ((height_m - lowest_m) * steps_per_m).round().clamp(0.0, STEPS_MAX) as u32;
+        let [_, red, green, blue] = step.to_be_bytes();
+        [red, green, blue]
+    }
 }
 
 #[cfg(test)]

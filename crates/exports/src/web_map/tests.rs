@@ -102,3 +102,37 @@ fn ground_beyond_the_end_of_web_mercator_is_refused() {
     let error = Pyramid::of(&samples::product(), WebMap { pixels: 300, ..MAP }).err().unwrap();
     assert!(error.to_string().contains("found 300 pixels, expected 256 or 512"), "{error}");
 }
+
+#[test]
+fn the_world_is_a_square_and_places_come_back() {
+    assert_eq!(on_map([-180.0, 0.0]), [0.0, 0.5]);
+    assert!(on_map([0.0, LATITUDE_MAX])[1].abs() < 1e-12);
+    let back = lon_lat(on_map([-116.5, 35.25]));
+    assert!((back[0] + 116.5).abs() < 1e-12 && (back[1] - 35.25).abs() < 1e-12);
+}
+
+#[test]
+fn levels_go_from_one_tile_to_pixels_no_larger_than_posts() {
+    let extent = Extent::of(&[[-116.9, 35.0], [-116.4, 35.4]]);
+    let finest = extent.finest_level(512, 25.0);
+    assert_eq!((extent.coarsest_level(finest), finest), (9, 12));
+    let [cols, rows] = extent.tiles(9);
+    assert!(cols.count() <= 2 && rows.count() <= 2);
+    // Smaller than a pixel is still in some tile.
+    let dot = Extent::of(&[[10.0, 10.0], [10.000_001, 10.000_001]]);
+    assert_eq!(dot.coarsest_level(dot.finest_level(256, 25.0)), 13);
+}
+
+#[test]
+fn a_colour_is_within_half_a_step_of_its_height() {
+    assert_eq!(HeightEncoding::Mapbox.color(0.0), [1, 134, 160]);
+    assert_eq!(HeightEncoding::Terrarium.color(0.0), [128, 0, 0]);
+    for height_m in [-430.5, -0.04, 0.0, 0.051, 1234.5678, 8848.86] {
+        let [red, green, blue] = HeightEncoding::Mapbox.color(height_m).map(f64::from);
+        let back = -10_000.0 + 0.1 * (65_536.0 * red + 256.0 * green + blue);
+        assert!((back - height_m).abs() <= 0.05 + 1e-9, "{height_m}: {back}");
+        let [red, green, blue] = HeightEncoding::Terrarium.color(height_m).map(f64::from);
+        let back = 256.0 * red + green + blue / 256.0 - 32_768.0;
+        assert!((back - height_m).abs() <= 0.5 / 256.0 + 1e-9, "{height_m}: {back}");
+    }
+}
