@@ -8,8 +8,8 @@ use terrain::{ModuleId, ModuleRect, ModuleResidual, RefusedBy, TileId, metres_of
 use crate::CompileError;
 use crate::enforce::ByModule;
 use crate::refine::Published;
-use crate::refused::RefusedPosts;
 use crate::run::Run;
+use crate::sums::RefusedPosts;
 use crate::without_limits::without_limits;
 
 /// Refusals of the whole area by load module: a tile is refused posts on its sides by load modules of its neighbours.

@@ -14,11 +14,10 @@ use store::Profile;
 use terrain::{LineStorey, TileId};
 
 use crate::CompileError;
-use crate::heard::Heard;
 use crate::level::shares;
 use crate::pieces::cost_of;
 use crate::profile::sound;
-use crate::read_features::ReadFeatures;
+use crate::read_features::{Heard, ReadFeatures};
 use crate::run::Run;
 
 /// Triangles of a load module on average that are tried: SIMNET's first.

@@ -15,9 +15,8 @@ use crate::profile::profile;
 use crate::publish::{beginning, database_area, prepare, publish};
 use crate::refine::refine;
 use crate::report::Findings;
-use crate::run::{ALGORITHM_REVISION, Options, Run, changed};
+use crate::run::{ALGORITHM_REVISION, Options, Run, Tins, changed};
 use crate::survey::{allocate, survey};
-use crate::tins::Tins;
 use crate::{CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A finished build.

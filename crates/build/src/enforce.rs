@@ -11,10 +11,9 @@ use terrain::{LatticePoint, ModuleId, Post, TileId};
 use tin::load_modules::{Layout, Removal, RemovalGround, halo_posts, propose_removals};
 
 use crate::assemble::{assemble_tile, points_around};
-use crate::assembled::{Assembled, ModuleNumbers};
 use crate::refine::Published;
 use crate::run::Run;
-use crate::sums::Sums;
+use crate::sums::{Assembled, ModuleNumbers, Sums};
 use crate::{CompileError, Event, Progress, Stage};
 
 /// Rounds of removal and assembly, at most; what is over its limit after them is a breach.

@@ -6,14 +6,15 @@
 //! one in the area's own system and one in degrees; and `configs/paper.toml`. The forecast of each was within a factor
 //! of 1.5 of what it took. Other machines differ in time, and jobs that end at a residual take less than their budget.
 
-use crate::ground::{CACHE_BYTES_MAX, GamingArea, KEPT_POSTS_MAX};
-use job::{Budget as PointBudget, Choice, DemSource, Edges, Job, LodBorder};
+use job::{Budget as PointBudget, Choice, DemSource, Edges, Job, LodBorder, TileOrder};
 
+use crate::CompileError;
 use crate::curves::BAND_BYTES_MAX;
+use crate::ground::{CACHE_BYTES_MAX, GamingArea, KEPT_POSTS_MAX, PlannedTile, planned_tiles};
 use crate::product::DRAWN_AT_ONCE;
 use crate::refinement::optimising;
+use crate::run::KEPT_BYTES_MAX;
 use crate::tasks::{is_surveyed, is_surveyed_in_haste};
-use crate::tins::KEPT_BYTES_MAX;
 
 /// What a build is expected to take. Measured rates of one core at present; other machines differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -237,4 +238,42 @@ fn worker_bytes(job: &Job, size: &Size) -> u64 {
     let (of_post, of_triangle) = if optimising(job).is_some() { MEMORY_OPTIMISING } else { MEMORY_GROWING };
     let window = if size.is_kept { 0 } else { MEMORY_POST_IN_WORK };
     (size.posts * (of_post + window) + size.triangles * of_triangle) / size.tiles
+}
+
+/// A job, planned.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Every tile, row by row from the south-west.
+    pub tiles: Vec<PlannedTile>,
+    /// What it will take.
+    pub forecast: Forecast,
+    /// Triangles of the area, at most.
+    pub budget: u64,
+    /// Triangles before any point is selected.
+    pub start: u64,
+    /// Tiles that can be refined at once: more workers have nothing to do there.
+    pub workers_useful: usize,
+    /// Whether tiles are surveyed before they are refined.
+    pub is_surveyed: bool,
+    /// Whether the load modules of a tile are made from its neighbours' TINs too.
+    pub is_clipped: bool,
+}
+
+/// Plans a job; nothing is read but the job.
+///
+/// # Errors
+/// When no build can meet it: limits below the initial points, keys that contradict each other.
+pub fn plan(job: &Job) -> Result<Plan, CompileError> {
+    let area = GamingArea::new(job)?;
+    let tiles = planned_tiles(&area);
+    let of_color = |color| tiles.iter().filter(|tile| tile.color == color).count();
+    let workers_useful = match job.tiles.order {
+        TileOrder::Color => (0..4).map(of_color).max().unwrap_or(1).max(1),
+        // A wave front: each row of tiles two columns behind the row south of it.
+        TileOrder::Raster => (job.tiles.rows as usize).min(job.tiles.columns.div_ceil(2) as usize),
+    };
+    let (budget, start) = (area.budget.area, area.budget.start_total());
+    let is_clipped = matches!(job.modules.edges, Edges::Clip(_));
+    let forecast = forecast(job, &area);
+    Ok(Plan { forecast, tiles, budget, start, workers_useful, is_surveyed: is_surveyed(job), is_clipped })
 }

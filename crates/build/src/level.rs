@@ -1,20 +1,20 @@
 //! The stage `level`: how high all features of the area lie, and what they put into each tile. It sees profiles and
 //! features, never a raster.
+//!
+//! Buildings of the sources are kept beside: they are drawn only, so no other stage asks for them.
 
 use features::{Share, Shares, Sounded};
-use job::FeaturesSpec;
-use store::engine::{Artifact, Key, Outcome, Stamp, keep_or_make};
-use store::{AreaLevel, FileStamp, Profile};
-use terrain::TileId;
+use job::{FeaturesSpec, Job};
+use store::engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
+use store::{AreaLevel, Building, FileStamp, Folder, Profile, SourceRecord, files};
+use terrain::{TileId, in_turn};
 use tin::tiling::Budget;
 
-use crate::buildings::publish_buildings;
-use crate::heard::Heard;
-use crate::keys;
+use crate::ground::GamingArea;
 use crate::pieces::{area_level, pieces, reserved};
-use crate::read_features::ReadFeatures;
+use crate::read_features::{Heard, ReadFeatures};
 use crate::run::{ALGORITHM_REVISION, Run};
-use crate::{CompileError, Event, Progress, Stage};
+use crate::{CompileError, Event, Progress, Stage, keys};
 
 /// Decides all heights of features, or keeps what is published and fresh. `profiles` has the ground by tile.
 pub(crate) fn level(
@@ -98,5 +98,81 @@ pub(crate) fn shares(budget: &Budget, spec: &FeaturesSpec) -> Shares {
         modules: start.iter().map(|&start| share(budget.per_module.into(), start.into())).collect(),
         windows: sums.into_iter().map(|start| share(budget.per_window.into(), start.into())).collect(),
         area: share(budget.area, start.iter().map(|&start| u64::from(start)).sum()),
+    }
+}
+
+/// The fingerprint of what features of an area come to, from their files, which `records` name, and from the ground
+/// along them as it is published; `None` where that is not the ground along these features, or the job has none.
+///
+/// # Errors
+/// When a file cannot be read.
+pub fn level_fingerprint(
+    job: &Job,
+    area: &GamingArea,
+    records: &[SourceRecord],
+    folder: &Folder,
+) -> Result<Option<Fingerprint>, CompileError> {
+    let Some(read) = ReadFeatures::open(job, area, &in_turn)? else { return Ok(None) };
+    let mut profiles = Vec::new();
+    for (index, &tile) in area.tiles.iter().enumerate() {
+        let (.., profile) = folder.read_profile(tile)?;
+        let asked = [read.stations(index).len(), read.on_ways(index).len()];
+        if asked != [profile.heights.len(), profile.middles.len()] {
+            return Ok(None);
+        }
+        profiles.push(profile);
+    }
+    let heard = Heard::of(&read, profiles.iter());
+    Ok(Some(keys::level(job, &area.budget, records, read.seen(), heard.sounded()).fingerprint()))
+}
+
+/// Publishes the buildings of a job that has some, or keeps what is published and fresh.
+fn publish_buildings(run: &Run, read: &ReadFeatures) -> Result<(), CompileError> {
+    if are_wanted(run) {
+        keep_or_make(&Buildings { run, all: &read.vectors.buildings }, ALGORITHM_REVISION)?;
+    }
+    Ok(())
+}
+
+/// What `database.json` says of their file; nothing where the job wants none, and then none of an earlier job is left.
+pub(crate) fn stamp_of_buildings(run: &Run) -> Result<Option<FileStamp>, CompileError> {
+    if !are_wanted(run) {
+        run.database.remove(files::BUILDINGS)?;
+        return Ok(None);
+    }
+    let folder = run.database.folder();
+    Ok(Some(folder.stamp_file(&folder.path(files::BUILDINGS))?))
+}
+
+fn are_wanted(run: &Run) -> bool {
+    run.job.features.as_ref().is_some_and(job::FeaturesSpec::has_buildings)
+}
+
+/// The buildings of the area, as the engine asks for them.
+struct Buildings<'a> {
+    run: &'a Run<'a>,
+    all: &'a [Building],
+}
+
+impl Artifact for Buildings<'_> {
+    type Output = ();
+    type Error = CompileError;
+
+    fn key(&self) -> Key {
+        keys::buildings(self.all)
+    }
+
+    fn published(&self) -> Result<Option<Stamp>, CompileError> {
+        Ok(self.run.database.folder().buildings_stamp()?)
+    }
+
+    fn read(&self, _key: &Key) -> Option<(Stamp, ())> {
+        let (stamp, _) = self.run.database.folder().read_buildings().ok()?;
+        Some((stamp, ()))
+    }
+
+    fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(), CompileError> {
+        self.run.database.write_buildings(stamp, self.all)?;
+        Ok(())
     }
 }

@@ -10,13 +10,13 @@ use store::{
 use terrain::{LatticePoint, TileId};
 
 use crate::assemble::crs;
-use crate::assembled::Assembled;
-use crate::buildings::stamp_of_buildings;
 use crate::forecast::{PAGE_MODULES_MAX, PAGE_POSTS_MAX};
+use crate::level::stamp_of_buildings;
 use crate::outlines::objects_report;
 use crate::refine::Published;
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Run, changed, run_name};
+use crate::sums::Assembled;
 use crate::survey::Shares;
 use crate::tasks::is_surveyed;
 use crate::{CompileError, Event, Progress, Stage, Stopwatch};

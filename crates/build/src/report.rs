@@ -14,14 +14,12 @@ use terrain::limits::Windows;
 use terrain::{ModuleId, ModuleResidual, RefusedBy, StopReason, metres_of_quanta};
 
 use crate::CompileError;
-use crate::assembled::{Assembled, ModuleNumbers};
 use crate::bound::{bound, of_area};
 use crate::budgets::{Budgeted, enough_for};
 use crate::enforce::{ByModule, Enforced, counted};
 use crate::refine::Published;
-use crate::refused::RefusedPosts;
 use crate::run::Run;
-use crate::sums::Sums;
+use crate::sums::{Assembled, ModuleNumbers, RefusedPosts, Sums};
 
 /// Millimetres in a metre: the unit in which a residual's breach is counted.
 const MILLIMETRES: f64 = 1000.0;

@@ -9,20 +9,18 @@ use store::{Database, DatabaseError, Folder, Manifest, ManifestState, Report, Ti
 use terrain::{Post, SeamSides, Side, TileId, TileTin, Vertex};
 
 use crate::assemble::{assemble, assemble_tile, read_assembled};
-use crate::assembled::Assembled;
 use crate::build::{decide_features, open};
 use crate::curves::Curves;
 use crate::enforce::enforce;
-use crate::keys;
 use crate::outlines::decide_objects;
 use crate::publish::{beginning, prepare, publish};
 use crate::refine::{Published, Refining};
 use crate::report::Findings;
 use crate::run::{ALGORITHM_REVISION, Options, Run};
-use crate::sums::{Adding, Sums};
+use crate::sums::{Adding, Assembled, Sums};
 use crate::survey::{Shares, allocate};
 use crate::tasks::{inherited, is_surveyed, posts_of, seam_points, with_outer_sides};
-use crate::{CompileError, Event, Progress, Stage, Stopwatch};
+use crate::{CompileError, Event, Progress, Stage, Stopwatch, keys};
 
 /// A tile that was run again.
 #[derive(Debug)]

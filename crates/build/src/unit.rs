@@ -3,29 +3,32 @@
 //! A unit that is done leaves a mark with the fingerprint of what it published. What builds on it compares mark and
 //! file, and takes the mark back if they differ. `publish` walks through all stages again, keeps what is fresh and
 //! makes what is not, so whatever went wrong before, the result is that of a build.
+//!
+//! A process joins the build that is under way, or begins it where no other is at work.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use job::Job;
 use schedule::Workers;
 use store::engine::{Fingerprint, Outcome, Stamp};
-use store::{Folder, Profile, Work};
+use store::{Area, Database, DatabaseError, Folder, Manifest, ManifestState, Profile, SourceRecord, Work};
 use terrain::{LatticePoint, TileId, TileTin};
 
 use crate::assemble::assemble_tile;
-use crate::build::{Built, finish, open_with};
+use crate::build::{Built, finish, fresh, open_with};
 use crate::curves::Curves;
-use crate::enter::enter;
 use crate::level::level_area;
 use crate::order::{ORDER, Unit, around, needs, units};
 use crate::outlines::outlines_area;
 use crate::profile::profile_tile;
+use crate::publish::beginning_of;
 use crate::refine::{Published, refine_tile};
 use crate::run::{ALGORITHM_REVISION, Options, Run, run_name};
 use crate::survey::{allocate, survey_tile};
 use crate::tasks::{inherited, is_surveyed};
-use crate::{CompileError, Event, Progress, Stage, Stopwatch};
+use crate::{Clock, CompileError, Event, Progress, Stage, Stopwatch};
 
 /// A process's part in a build that several processes share.
 pub(crate) struct Session<'a> {
@@ -284,4 +287,62 @@ struct Silent;
 
 impl Progress for Silent {
     fn tell(&mut self, _event: Event) {}
+}
+
+/// How often a process asks that wants to begin a build, and how long it waits in between: others that come at the same
+/// moment stand in its way for an instant only.
+const TRIES: usize = 100;
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// A database that this process shares.
+struct Entered {
+    pub database: Database,
+    /// What `database.json` says.
+    pub manifest: Manifest,
+    /// Whether there is nothing to do.
+    pub is_finished: bool,
+}
+
+/// Shares the database in `folder`, in which a build of this job from these sources is under way or finished when this
+/// returns. It is begun by a process that is alone there: so nothing of another build, not even by a process that
+/// is only slow, comes between its files.
+///
+/// # Errors
+/// [`CompileError::OtherRun`] while processes build something else there; others as for a build.
+fn enter(
+    job: &Job,
+    records: &[SourceRecord],
+    folder: &Folder,
+    area: &Area,
+    clock: &dyn Clock,
+) -> Result<Entered, CompileError> {
+    let canonical = job.canonical_text();
+    let is_ours = |manifest: &Manifest| {
+        manifest.job == canonical && manifest.algorithm_revision == ALGORITHM_REVISION && manifest.sources == records
+    };
+    let is_under_way = |manifest: &Manifest| is_ours(manifest) && manifest.state == ManifestState::Incomplete;
+    for tries_left in (0..TRIES).rev() {
+        let (database, previous) = match Database::join(folder, area) {
+            // By another process that begins it, or by a build, which stays longer.
+            Err(DatabaseError::Locked { .. }) if 0 < tries_left => {
+                clock.wait(PAUSE);
+                continue;
+            }
+            joined => joined?,
+        };
+        if let Some(manifest) = previous {
+            let is_finished = fresh(database.folder(), &manifest, job, records)?.is_some();
+            if is_finished || is_under_way(&manifest) {
+                return Ok(Entered { database, manifest, is_finished });
+            }
+        }
+        drop(database);
+        match Database::create_or_open(folder, area) {
+            Ok((_, Some(manifest))) if is_under_way(&manifest) => {}
+            Ok((database, previous)) => database.begin(&beginning_of(job, records, previous.as_ref()))?,
+            Err(DatabaseError::Locked { .. }) => clock.wait(PAUSE),
+            Err(error) => return Err(error.into()),
+        }
+    }
+    Err(CompileError::OtherRun { path: folder.dir().display().to_string() })
 }

@@ -14,8 +14,8 @@ use tin::{Stop, TileTask};
 use crate::CompileError;
 use crate::refine::Published;
 use crate::refinement::{Most, Refinement, optimising};
-use crate::refused::RefusedPosts;
 use crate::run::Run;
+use crate::sums::RefusedPosts;
 use crate::tasks::{posts_of, rule};
 
 /// The residuals of the load modules of a tile in which posts were refused, had it had that many more.

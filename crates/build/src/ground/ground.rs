@@ -1,24 +1,25 @@
 //! The ground of a job: windows of heights and weights on demand.
 
+use std::num::NonZeroUsize;
 use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use job::{DemSource, Job};
+use job::{DemSource, Job, Sight};
+use lru::LruCache;
 use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
 use store::Folder;
-use terrain::mask::Mask;
-use terrain::{Dem, GridFrame, PostRect, TileFeatures, TileId};
+use terrain::mask::{Mask, Surroundings};
+use terrain::{Dem, GridFrame, HOLE_CLASS, PostRect, Spacing, TileFeatures, TileId};
 
 use crate::ground::area::GamingArea;
-use crate::ground::bounds::Bounds;
+use crate::ground::burn::burn;
 use crate::ground::census::Census;
 use crate::ground::excluded::GamingAreaFrame;
 use crate::ground::given::Given;
 use crate::ground::large::WHOLE_BYTES_MAX;
-use crate::ground::lines::Lines;
 use crate::ground::mask_of::{Fault, Opening};
-use crate::ground::relief::Relief;
+use crate::ground::relief::{Bounds, Relief};
 use crate::ground::source::Source;
 use crate::ground::sources::Opened;
 use crate::ground::water::{Soundings, Water};
@@ -289,6 +290,86 @@ fn find_levels(
     let without = relief.water.as_mut().map_or(0, |water| water.level(&all));
     let told = || format!("{without} bodies of water hold no post with a height and are left as they are");
     Ok((0 < without).then(told))
+}
+
+/// Eyes and their range as the scan counts them.
+pub fn scanned(sight: Sight, metres_per_post: f64) -> terrain::mask::Sight {
+    let quanta_per_post = metres_per_post * f64::from(terrain::QUANTA_PER_METRE);
+    terrain::mask::Sight::new(sight.eyes_quanta, f64::from(sight.range_quanta) / quanta_per_post, metres_per_post)
+}
+
+impl Ground {
+    /// A tile's ground and what lies within sight of it.
+    ///
+    /// # Errors
+    /// As [`Ground::around`].
+    pub fn within_sight(
+        &self,
+        area: &GamingArea,
+        tile: TileId,
+        sight: &terrain::mask::Sight,
+    ) -> Result<Surroundings, GroundError> {
+        let wide = self.around(area, tile, sight.halo())?;
+        // Voids are filled from whatever window they are read with.
+        let height = |post| (wide.importance.class(post) != HOLE_CLASS).then(|| wide.dem.height(post));
+        Ok(Surroundings::new(wide.dem.rect(), height))
+    }
+}
+
+/// Tiles whose features are kept in memory at most.
+const TILES_MAX: NonZeroUsize = NonZeroUsize::new(64).expect("64 is not 0");
+
+/// Where what features put into tiles is read from.
+struct Lines {
+    folder: Folder,
+    tiles: Vec<(TileId, PostRect)>,
+    spacing: Spacing,
+    /// Times that posts on features weigh which are not in the TIN.
+    left_out_weight: f64,
+    read: Mutex<LruCache<TileId, Arc<TileFeatures>>>,
+    windows: Option<Vec<OnceLock<Arc<Window>>>>,
+}
+
+impl Lines {
+    /// Of the tiles of `area`; `keeps` says whether windows of tiles are kept.
+    pub fn new(folder: &Folder, area: &GamingArea, left_out_weight: f64, keeps: bool) -> Self {
+        let tiles: Vec<_> = area.tiles.iter().map(|&tile| (tile, area.tiling.rect(tile))).collect();
+        let windows = keeps.then(|| tiles.iter().map(|_| OnceLock::new()).collect());
+        let (folder, spacing) = (folder.clone(), area.frame.spacing);
+        Self { folder, tiles, spacing, left_out_weight, read: Mutex::new(LruCache::new(TILES_MAX)), windows }
+    }
+
+    /// Where the window of a tile is kept.
+    pub fn kept(&self, index: usize) -> Option<&OnceLock<Arc<Window>>> {
+        self.windows.as_ref().map(|windows| &windows[index])
+    }
+
+    /// What features put into a tile.
+    pub fn features(&self, tile: TileId) -> Result<Arc<TileFeatures>, GroundError> {
+        let known = || self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(features) = known().get(&tile) {
+            return Ok(features.clone());
+        }
+        let (_, read) = self.folder.read_lines(tile)?;
+        let read = Arc::new(read);
+        known().put(tile, read.clone());
+        Ok(read)
+    }
+
+    /// The window of a tile with its features; its neighbours add nothing that it does not have.
+    pub fn burn_tile(&self, window: Window, tile: TileId) -> Result<Window, GroundError> {
+        Ok(burn(window, &*self.features(tile)?, (self.spacing, self.left_out_weight)))
+    }
+
+    /// A window with the features of all tiles that it touches. What lies on a line between tiles is burned from the
+    /// natural ground by each, and the same by all.
+    pub fn burn(&self, window: &Window) -> Result<Window, GroundError> {
+        let rect = window.dem.rect();
+        let touched = self.tiles.iter().filter_map(|(tile, of)| Some((*tile, of.intersection(&rect)?)));
+        let part = |(tile, of)| self.burn_tile(Window::of(window.dem.window(of), window.importance.window(of)), tile);
+        let parts = touched.map(part).collect::<Result<Vec<_>, _>>()?;
+        Ok(Window::joined(rect, &parts.iter().collect::<Vec<_>>()))
+    }
 }
 
 #[cfg(test)]

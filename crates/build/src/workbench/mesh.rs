@@ -21,11 +21,9 @@ use tin::tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 
 use crate::workbench::heights::Heights;
-use crate::workbench::join::join;
 use crate::workbench::request::{TinMethod, TinRequest, TinStart, refuse};
 use crate::workbench::tally::{tally_of, tally_on_all, without_voids};
-use crate::workbench::tiles::usual_tiles;
-use crate::workbench::trend::continued;
+use crate::workbench::tiles::{continued, join, usual_tiles};
 
 /// The paper's proximity test: metres across, metres in height.
 const PROXIMITY_M: (f64, u32) = (300.0, 20);

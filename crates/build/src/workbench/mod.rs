@@ -23,9 +23,7 @@ mod surface;
 pub use surface::{PostHeights, SurfaceRaster, is_same_datum};
 
 mod heights;
-mod join;
 mod outlook;
 mod suiting;
 mod tally;
 mod tiles;
-mod trend;
