@@ -6,7 +6,11 @@ mod verify;
 pub use verify::{NetworkFound, Verdict, verify};
 mod inadequate;
 pub use inadequate::{Component, Inadequate, inadequate};
+mod explain;
 mod measures;
+pub use explain::{
+    ExplainedFeatures, ExplainedObjects, ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain,
+};
 pub use fidelity::{
     Cover, Distances, Drainage, GRADES, Hausdorff, LineOfSight, Measures, MeshForm, Registration, ResidualFigures,
     SeamVisibility, SlopeClasses, SlopeDifference,
@@ -14,10 +18,6 @@ pub use fidelity::{
 pub use measures::{
     BuiltResidual, ClassResidual, DatabaseFidelity, Fidelity, PastObjectsFound, Sights, fidelity, measure,
 };
-mod explained_features;
-pub use explained_features::{ExplainedFeatures, ExplainedObjects};
-mod explain;
-pub use explain::{ExplainedRefusal, ExplainedWindow, Explanation, OneMore, explain};
 mod difference;
 pub use difference::{Difference, ModuleDifference, SettingDifference, difference};
 mod correlate;

@@ -11,7 +11,6 @@ mod figures;
 mod laid;
 mod made_from;
 mod modules;
-mod opened;
 mod square;
 mod standing;
 mod tins;
@@ -93,7 +92,7 @@ pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError
     if !verdict.problems.is_empty() {
         return Ok(verdict);
     }
-    let opened = opened::open(&folder, &job, &area)?;
+    let opened = modules::open_as_simulators(&folder, &job, &area)?;
     let levels = &Modules::levels(&folder, &area, opened.level_count);
     let mut walked = walk::walk(&job, &area, levels);
     levels[0].fault()?;

@@ -5,7 +5,6 @@
 
 mod statistics;
 pub use statistics::{Confusion, Demand, Kappa, Plan, SAMPLES_MAX};
-mod posts;
 mod surface;
 pub use surface::SurfaceFacts;
 mod places;

@@ -10,8 +10,7 @@ use terrain::limits::{polygons_of, triangles_of};
 use terrain::{LoadModule, ModuleId, Side, TileId};
 
 use super::figures::impossible;
-use super::modules::{Modules, at_level};
-use super::opened::unknown_class;
+use super::modules::{Modules, at_level, unknown_class};
 use super::total::LevelSums;
 use crate::recount::{RowSides, cracks, cracks_between};
 
