@@ -1,15 +1,13 @@
 //! A folder of many files that appears under its name only when it is whole.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use tempfile::TempDir;
 
 use crate::failure::Failure;
-use crate::left_over;
-use crate::making::Making;
-use crate::signals;
+use crate::left_over::Making;
+use crate::{left_over, signals};
 
 /// A folder in the making, beside the place where it will appear.
 #[derive(Debug)]

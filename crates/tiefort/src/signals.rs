@@ -16,7 +16,7 @@ use signal_hook::flag;
 use store::engine::Writing;
 
 use crate::failure::Failure;
-use crate::making::{self, Making};
+use crate::left_over::{self, Making};
 use crate::terminal;
 
 /// Added to a signal's number, gives the exit code shells expect.
@@ -62,7 +62,7 @@ fn end_where_nothing_else_does() {
             while !signals.stop.load(Ordering::Relaxed) {
                 thread::sleep(LOOK);
             }
-            let _nothing_begins = making::remove_all();
+            let _nothing_begins = left_over::remove_all_made();
             std::process::exit(i32::from(signals.exit_code().unwrap_or(1)));
         });
     });
@@ -126,7 +126,7 @@ impl Signals {
             signals.tell_once(|| {
                 failure.tell();
             });
-            let _nothing_begins = making::remove_all();
+            let _nothing_begins = left_over::remove_all_made();
             std::process::exit(i32::from(signals.exit_code().unwrap_or(1)));
         });
     }

@@ -6,15 +6,19 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 use exports::Step;
-use inspect::{CorrelateRequest, Correlation, Demand, SAMPLES_MAX};
+use inspect::{
+    Confusion, CorrelateRequest, Correlation, Criterion, Demand, HeightFigures, SAMPLES_MAX, SLOPE_ENDS_DEGREES, Shift,
+};
 use load_module_reader::Standing;
+use serde_json::{Value, json};
 use views::{certificate_html, certificate_text};
 
 use crate::arguments::{Format, Workers, positive};
 use crate::certificate::certificate;
 use crate::failure::{Failure, Outcome};
+use crate::measures_json::{measured, where_any};
 use crate::steps::Steps;
-use crate::{correlation_json, files, places};
+use crate::{files, places};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -109,7 +113,7 @@ fn range(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let steps = Steps::start(arguments.quiet);
     let found = found(arguments, &AtomicBool::new(false), &steps)?;
-    arguments.format.print(|| certificate_text(&certificate(&found)), || correlation_json::to_json(&found))?;
+    arguments.format.print(|| certificate_text(&certificate(&found)), || to_json(&found))?;
     Ok(if found.is_accepted() { Outcome::Sound } else { Outcome::Differ })
 }
 
@@ -118,7 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 /// # Errors
 /// When there is nothing to compare, or the page cannot be written.
 pub fn json_text(arguments: &Arguments, stop: &AtomicBool) -> Result<String, Failure> {
-    Ok(correlation_json::to_json(&found(arguments, stop, &Steps::start(true))?).to_string())
+    Ok(to_json(&found(arguments, stop, &Steps::start(true))?).to_string())
 }
 
 /// What is found, with the page written where one is asked for.
@@ -145,4 +149,94 @@ fn found(arguments: &Arguments, stop: &AtomicBool, steps: &Steps) -> Result<Corr
         files::write_whole(path, |out| out.write_all(certificate_html(&certificate(&found)).as_bytes()))?;
     }
     Ok(found)
+}
+
+/// All of it.
+fn to_json(found: &Correlation) -> Value {
+    let request = &found.request;
+    json!({
+        "tiefort": env!("CARGO_PKG_VERSION"),
+        "accepted": found.is_accepted(),
+        "causes": found.causes,
+        "notes": found.notes,
+        "a": found.surfaces[0],
+        "b": found.surfaces[1],
+        "common_m": found.common_m,
+        "plan": {
+            "accept": request.demand.share,
+            "risk": request.demand.risk,
+            "samples": found.plan.samples,
+            "failures_max": found.plan.failures_max,
+            "seed": request.seed,
+            "within_m": request.within_m,
+            "slope_within_degrees": request.slope_within_degrees,
+            "range_m": request.range_m,
+            "objects": places::standing_word(found.standing),
+        },
+        "criteria": found.criteria.iter().map(criterion).collect::<Vec<_>>(),
+        "places": {
+            "ground_in_a_only": found.only_one[0],
+            "ground_in_b_only": found.only_one[1],
+            "void_in_both": found.void_places,
+            "pairs_left_out": found.void_pairs,
+        },
+        "heights": heights(&found.heights),
+        "shift": found.shift.as_ref().map(|shift| shift_json(shift, found)),
+        "slopes": {
+            "apart_m": found.slopes.apart_m,
+            "ends_degrees": SLOPE_ENDS_DEGREES,
+            "rms_degrees": where_any(0 < found.slopes.classes.total(), found.slopes.rms_degrees),
+            "classes": confusion(&found.slopes.classes),
+        },
+        "classes": found.classes.iter().map(|class| json!({
+            "name": class.name,
+            "heights": heights(&class.heights),
+        })).collect::<Vec<_>>(),
+        "sights": found.sights.iter().map(|sight| json!({
+            "above_m": sight.above_m,
+            "hidden_seen": confusion(&sight.pairs),
+        })).collect::<Vec<_>>(),
+        "map": found.map,
+    })
+}
+
+fn criterion(criterion: &Criterion) -> Value {
+    let agreement = criterion.agreement();
+    let more = json!({
+        "agreement": agreement.map(|(share, _)| share),
+        "interval": agreement.map(|(_, interval)| interval),
+        "accepted": criterion.is_accepted(),
+    });
+    measured(true, criterion, more)
+}
+
+fn heights(figures: &HeightFigures) -> Value {
+    let [p50, p90, p95, p99] = figures.absolute_m;
+    let largest_at_m = (0 < figures.places).then_some(figures.largest_at_m);
+    let more = json!({ "p50_m": p50, "p90_m": p90, "p95_m": p95, "p99_m": p99, "largest_at_m": largest_at_m });
+    measured(0 < figures.places, figures, more)
+}
+
+fn shift_json(shift: &Shift, found: &Correlation) -> Value {
+    let level = |metres: f64| where_any(shift.is_level_told, metres);
+    let part = |of: [f64; 3]| json!({ "east_m": level(of[0]), "north_m": level(of[1]), "up_m": of[2] });
+    json!({
+        "moves_b_by": part(shift.by_m),
+        "standard_error": part(shift.error_m),
+        "rms_before_m": shift.rms_m[0],
+        "rms_after_m": shift.rms_m[1],
+        "is_aside": shift.is_aside(found.spacing_m()),
+        "is_up": shift.is_up(found.request.within_m),
+    })
+}
+
+fn confusion<const N: usize>(table: &Confusion<N>) -> Value {
+    let kappa = table.kappa();
+    json!({
+        "a_by_b": table.0.iter().map(|row| row.to_vec()).collect::<Vec<_>>(),
+        "samples": table.total(),
+        "agreement": where_any(0 < table.total(), table.agreeing() as f64 / table.total().max(1) as f64),
+        "kappa": kappa.map(|kappa| kappa.kappa),
+        "kappa_interval": kappa.map(|kappa| kappa.interval),
+    })
 }

@@ -12,9 +12,9 @@ use views::{Align, Table, fold, grouped};
 use crate::arguments::rows_by_columns;
 use crate::commands::budgets::{self, Tried};
 use crate::commands::plan_features;
-use crate::engines::{self, Glue};
+use crate::engines::{self, Glue, costs_of};
 use crate::failure::{Failure, Outcome};
-use crate::{costs, files, fit, run, terminal};
+use crate::{files, fit, run, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -124,7 +124,7 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
         return Err(Failure::new(message, "the largest that is played is 1024x1024"));
     }
     let default = PathBuf::from(format!("{}.tdb", job.area.name));
-    let costs = costs::of(job, plan, arguments.out.as_ref().unwrap_or(&default));
+    let costs = costs_of(job, plan, arguments.out.as_ref().unwrap_or(&default));
     let own = (job.tiles.rows, job.tiles.columns);
     let tiles = if arguments.tiles.is_empty() { &[own][..] } else { &arguments.tiles };
     let workers: Vec<usize> = arguments.simulate.iter().map(|&workers| workers as usize).collect();

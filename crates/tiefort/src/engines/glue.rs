@@ -1,14 +1,16 @@
 //! What an engine has to run, after what, in packs that are worth a start.
+//!
+//! What the tiles of a job cost is as a build of it measured, or as forecast.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use build::ground::GamingArea;
-use build::{CompileError, ORDER, Plan, Stage, Unit, needs, units};
+use build::{CompileError, Costs, ORDER, Plan, Stage, TileCosts, Unit, needs, units};
 use job::{DemSource, Job};
+use store::{Folder, Report};
 use terrain::TileId;
 
-use crate::costs;
 use crate::failure::Failure;
 use crate::program;
 
@@ -78,7 +80,7 @@ impl Glue {
             DemSource::Sample { .. } => Vec::new(),
         };
         let area = GamingArea::new(job).map_err(CompileError::from)?;
-        let costs = costs::of(job, plan, out);
+        let costs = costs_of(job, plan, out);
         let total_s: f64 = costs.tiles.iter().map(|tile| tile.refine_s).sum();
         let by_time = (TASK_S * plan.tiles.len() as f64 / total_s.max(1e-6)).clamp(1.0, 65_536.0) as usize;
         let pack = pack.map_or(by_time, |pack| pack as usize);
@@ -150,6 +152,45 @@ pub fn shell_word(path: &Path) -> String {
 /// A path as Python and YAML write a text: JSON's texts are theirs, too.
 pub fn literal(path: &Path) -> String {
     serde_json::Value::from(path.to_string_lossy().into_owned()).to_string()
+}
+
+/// Seconds of the tiles of `plan`: from the report of the database in `folder` if that was built in the same tiles,
+/// otherwise as forecast. What a last build kept has no time of its own and takes what the others take on average.
+pub fn costs_of(job: &Job, plan: &Plan, folder: &Path) -> Costs {
+    let folder = Folder::new(folder);
+    let fits = folder.manifest().is_ok_and(|manifest| {
+        let area = &manifest.area;
+        area.name == job.area.name && (area.tile_rows, area.tile_cols) == (job.tiles.rows, job.tiles.columns)
+    });
+    let measured = folder.report().ok().filter(|_| fits).and_then(|report| measured(plan, &report));
+    measured.unwrap_or_else(|| Costs::forecast(plan))
+}
+
+fn measured(plan: &Plan, report: &Report) -> Option<Costs> {
+    let known: BTreeMap<[u32; 2], &BTreeMap<String, f64>> =
+        report.tiles.iter().map(|tile| (tile.tile, &tile.seconds)).collect();
+    let of_stage = |stage: &str| -> Vec<Option<f64>> {
+        let seconds =
+            |tile: &build::ground::PlannedTile| known.get(&[tile.tile.row, tile.tile.col])?.get(stage).copied();
+        plan.tiles.iter().map(seconds).collect()
+    };
+    let refine = filled(&of_stage("refine"))?;
+    let nothing = vec![0.0; plan.tiles.len()];
+    let survey = filled(&of_stage("survey")).unwrap_or_else(|| nothing.clone());
+    let assemble = filled(&of_stage("assemble")).unwrap_or(nothing);
+    let cost = |at: usize| TileCosts { survey_s: survey[at], refine_s: refine[at], assemble_s: assemble[at] };
+    let forecast = Costs::forecast(plan);
+    Some(Costs { tiles: (0..plan.tiles.len()).map(cost).collect(), ..forecast })
+}
+
+/// Every number, with the mean where there is none; nothing where there are none at all.
+fn filled(seconds: &[Option<f64>]) -> Option<Vec<f64>> {
+    let known: Vec<f64> = seconds.iter().copied().flatten().collect();
+    if known.is_empty() {
+        return None;
+    }
+    let mean = known.iter().sum::<f64>() / known.len() as f64;
+    Some(seconds.iter().map(|seconds| seconds.unwrap_or(mean)).collect())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Files for engines that run the tasks of a build.
 
 mod glue;
-pub use glue::Glue;
+pub use glue::{Glue, costs_of};
 mod dask;
 pub use dask::dask;
 mod kubernetes;

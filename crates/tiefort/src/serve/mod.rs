@@ -7,7 +7,7 @@
 //!   snapshot      database as one build left it: opened again when its record changed   (contents)
 //!   ground        load modules in memory, for queries       (queries, body, looks)
 //!   globe         terrain and 3D Tiles, file by file        (files)
-//!   openapi, pages   what can be asked                     (paths)
+//!   openapi, pages   what can be asked
 //!   report_page   what a browser shows where no viewer is built in
 //! ```
 //! An answer comes from one finished build or says to ask later. All that stays in memory is bounded.
@@ -23,7 +23,6 @@ mod looks;
 mod openapi;
 mod page;
 mod pages;
-mod paths;
 mod queries;
 mod refusal;
 #[cfg(not(feature = "viewer"))]

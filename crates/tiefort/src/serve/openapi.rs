@@ -1,8 +1,7 @@
-//! What can be asked, for programs: an OpenAPI 3.1 document of the addresses in [`super::paths`].
+//! What can be asked, for programs: an OpenAPI 3.1 document of the addresses of databases, which the router writes as
+//! it does.
 
 use serde_json::{Value, json};
-
-use super::paths;
 
 const DESCRIPTION: &str = "Terrain databases over HTTP. With one database, all its addresses also work without \
     /{database}. Places are metres of the area's own system, east before north; rows and columns count from the \
@@ -17,50 +16,50 @@ pub fn document() -> Value {
         "info": { "title": "tiefort serve", "version": env!("CARGO_PKG_VERSION"), "description": DESCRIPTION },
         "servers": [{ "url": "/" }],
         "paths": {
-            paths::DATABASES: { "get": get("Every database", "", &[], &[("application/json", "the list")]) },
-            paths::DATABASE: {
+            DATABASES: { "get": get("Every database", "", &[], &[("application/json", "the list")]) },
+            DATABASE: {
                 "get": get("One database", "System, corner, size.", &["database"], &[("application/json", "it")]),
             },
-            paths::LAYER: { "get": get(
+            LAYER: { "get": get(
                 "Terrain for globes: layer.json",
                 "CesiumTerrainProvider.fromUrl() takes the address of the folder.",
                 &["database"],
                 &[("application/json", "the layer, as `tiefort export --format quantized-mesh` writes it")],
             ) },
-            paths::TERRAIN: { "get": get(
+            TERRAIN: { "get": get(
                 "A tile of terrain",
                 "Quantized-mesh 1.0 with normals, the bytes of the export.",
                 &["database", "z", "x", "file"],
                 &[("application/vnd.quantized-mesh", "the tile")],
             ) },
-            paths::HOLES: { "get": get(
+            HOLES: { "get": get(
                 "Where terrain is closed over ground without heights",
                 "404 where there are no holes.",
                 &["database"],
                 &[("application/geo+json", "polygons")],
             ) },
-            paths::TILESET: { "get": get(
+            TILESET: { "get": get(
                 "3D Tiles for globes: tileset.json",
                 "Cesium3DTileset.fromUrl() takes this address.",
                 &["database"],
                 &[("application/json", "the tileset, as `tiefort export --format 3dtiles` writes it")],
             ) },
-            paths::SQUARE: { "get": glb("The coarse mesh of a 4 km square", &["database", "file"]) },
-            paths::GROUP: { "get": glb("A group of load modules", &["database", "file"]) },
-            paths::LEVEL: { "get": glb("A square at a coarser level of detail", &["database", "level", "file"]) },
-            paths::MODULES: { "get": get(
+            SQUARE: { "get": glb("The coarse mesh of a 4 km square", &["database", "file"]) },
+            GROUP: { "get": glb("A group of load modules", &["database", "file"]) },
+            LEVEL: { "get": glb("A square at a coarser level of detail", &["database", "level", "file"]) },
+            MODULES: { "get": get(
                 "The files of load modules",
                 "With the load modules in each, its length and its BLAKE3 checksum.",
                 &["database"],
                 &[("application/json", "the list")],
             ) },
-            paths::MODULE: { "get": module() },
-            paths::HEIGHTS: { "post": heights() },
-            paths::SIGHT: { "post": line_of_sight() },
-            paths::VIEWSHED: { "get": viewshed() },
-            paths::PROFILE: { "get": profile() },
-            paths::OBSTACLE: { "get": obstacle() },
-            paths::EXPLAIN: { "get": explain() },
+            MODULE: { "get": module() },
+            HEIGHTS: { "post": heights() },
+            SIGHT: { "post": line_of_sight() },
+            VIEWSHED: { "get": viewshed() },
+            PROFILE: { "get": profile() },
+            OBSTACLE: { "get": obstacle() },
+            EXPLAIN: { "get": explain() },
         },
     })
 }
@@ -351,3 +350,21 @@ fn explain() -> Value {
     operation["responses"]["400"] = json!({ "description": "neither module nor at, or one that cannot be read" });
     operation
 }
+
+pub const DATABASES: &str = "/databases.json";
+pub const DATABASE: &str = "/{database}";
+pub const LAYER: &str = "/{database}/layer.json";
+pub const TERRAIN: &str = "/{database}/{z}/{x}/{file}";
+pub const HOLES: &str = "/{database}/holes.geojson";
+pub const TILESET: &str = "/{database}/tileset.json";
+pub const SQUARE: &str = "/{database}/squares/{file}";
+pub const GROUP: &str = "/{database}/groups/{file}";
+pub const LEVEL: &str = "/{database}/levels/{level}/{file}";
+pub const MODULES: &str = "/{database}/modules";
+pub const MODULE: &str = "/{database}/modules/{file}";
+pub const HEIGHTS: &str = "/{database}/heights";
+pub const SIGHT: &str = "/{database}/line-of-sight";
+pub const VIEWSHED: &str = "/{database}/viewshed";
+pub const PROFILE: &str = "/{database}/profile";
+pub const OBSTACLE: &str = "/{database}/obstacle";
+pub const EXPLAIN: &str = "/{database}/explain";

@@ -20,10 +20,10 @@ use tower_http::cors::{AllowOrigin, CorsLayer};
 
 use super::answers::{self, Context, Shared, path_of};
 use super::refusal::Refusal;
-use super::{openapi, pages, paths};
+use super::{openapi, pages};
 
 /// Addresses that belong to no database.
-const OF_ALL: [&str; 4] = ["/", "/docs", "/openapi.json", paths::DATABASES];
+const OF_ALL: [&str; 4] = ["/", "/docs", "/openapi.json", openapi::DATABASES];
 /// A refusal in words is this long at most.
 const WORDS_MAX: usize = 4 << 10;
 /// Answers below this gain nothing by packing.
@@ -39,24 +39,24 @@ pub fn routes(shared: Arc<Shared>, cors: &[String], has_index: bool) -> Router {
     let router = first
         .route("/docs", get(async || pages::docs(&openapi::document())))
         .route("/openapi.json", get(openapi_document))
-        .route(paths::DATABASES, get(answers::databases))
-        .route(paths::DATABASE, get(answers::database))
+        .route(openapi::DATABASES, get(answers::databases))
+        .route(openapi::DATABASE, get(answers::database))
         .route("/{database}/", get(answers::database))
-        .route(paths::LAYER, get(answers::layer))
-        .route(paths::TERRAIN, get(answers::terrain_tile))
-        .route(paths::HOLES, get(answers::holes))
-        .route(paths::TILESET, get(answers::tileset))
-        .route(paths::SQUARE, get(answers::square))
-        .route(paths::GROUP, get(answers::group))
-        .route(paths::LEVEL, get(answers::level_of_square))
-        .route(paths::MODULES, get(answers::modules))
-        .route(paths::MODULE, get(answers::module_file))
-        .route(paths::HEIGHTS, post(answers::heights))
-        .route(paths::SIGHT, post(answers::line_of_sight))
-        .route(paths::VIEWSHED, get(answers::viewshed))
-        .route(paths::PROFILE, get(answers::profile))
-        .route(paths::OBSTACLE, get(answers::obstacle))
-        .route(paths::EXPLAIN, get(answers::explained))
+        .route(openapi::LAYER, get(answers::layer))
+        .route(openapi::TERRAIN, get(answers::terrain_tile))
+        .route(openapi::HOLES, get(answers::holes))
+        .route(openapi::TILESET, get(answers::tileset))
+        .route(openapi::SQUARE, get(answers::square))
+        .route(openapi::GROUP, get(answers::group))
+        .route(openapi::LEVEL, get(answers::level_of_square))
+        .route(openapi::MODULES, get(answers::modules))
+        .route(openapi::MODULE, get(answers::module_file))
+        .route(openapi::HEIGHTS, post(answers::heights))
+        .route(openapi::SIGHT, post(answers::line_of_sight))
+        .route(openapi::VIEWSHED, get(answers::viewshed))
+        .route(openapi::PROFILE, get(answers::profile))
+        .route(openapi::OBSTACLE, get(answers::obstacle))
+        .route(openapi::EXPLAIN, get(answers::explained))
         .fallback(async |uri: Uri| {
             Refusal::missing(format!("found {}, expected an address that /docs lists", uri.path()), "/ lists databases")
         })

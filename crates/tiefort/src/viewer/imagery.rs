@@ -24,11 +24,10 @@ use lru::LruCache;
 use store::Fingerprint;
 use tokio::sync::Semaphore;
 
-use super::plain::FAULT;
 use crate::failure::Failure;
-use crate::resources;
 use crate::serve::files;
-use crate::terminal;
+use crate::viewer::plain::FAULT;
+use crate::{resources, terminal};
 
 /// Squares that are kept: 64 MiB.
 const KEPT_SQUARES: usize = (64 << 20) / (4 * SQUARE_PIXELS * SQUARE_PIXELS);

@@ -13,7 +13,7 @@ use axum::response::{IntoResponse, Response};
 use load_module_reader::{Area, Block, ReadError};
 
 use super::area::Viewed;
-use super::plain::{FAULT, bytes};
+use crate::viewer::plain::{FAULT, bytes};
 
 /// Heights that one texture of any browser holds: 1024 x 1024 and a few lines.
 const HEIGHTS_MAX: u64 = 1_100_000;

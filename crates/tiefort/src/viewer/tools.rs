@@ -17,9 +17,9 @@ use exports::Crs;
 use serde_json::{Value, json};
 
 use super::area::Viewed;
-use super::plain::FAULT;
 use crate::failure::Failure;
 use crate::places::{self, place};
+use crate::viewer::plain::FAULT;
 
 /// Places whose degrees are asked for at once: an address holds some thousand characters.
 const DEGREES_MAX: usize = 200;
