@@ -13,9 +13,8 @@ use pyo3::types::PyDict;
 use store::Folder;
 use tiefort::library::{self, Cause, Failure};
 
-use crate::arrays::places;
+use crate::arrays::{places, table};
 use crate::raised::{named, raised};
-use crate::tables::table;
 use crate::waiting::wait;
 
 /// Load modules up to which all of a database is loaded at the first question (about 12 kB each).

@@ -1,9 +1,12 @@
-//! Arrays of NumPy as heights and places. The package hands over arrays in C order, of the machine's byte order.
+//! Arrays of NumPy as heights and places, and rows of numbers as arrays. The package hands over arrays in C order, of
+//! the machine's byte order.
 
-use numpy::{Element, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use source_files::PostArray;
+use store::ReportResidual;
 
 /// Heights as an array has them, whose rows go from north to south unless `south_first`; and its rows and columns.
 ///
@@ -49,4 +52,24 @@ pub fn places<'a, const N: usize>(array: &'a PyReadonlyArray2<'_, f64>) -> PyRes
         (true, []) => Ok(places),
         _ => Err(PyTypeError::new_err(format!("expected {N} numbers in a row"))),
     }
+}
+
+/// Rows as an array of two dimensions, the second of `N`, made without another copy.
+pub fn table<'py, T: Element, const N: usize>(
+    py: Python<'py>,
+    rows: impl ExactSizeIterator<Item = [T; N]>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let count = rows.len();
+    let mut numbers = Vec::with_capacity(count * N);
+    rows.for_each(|row| numbers.extend(row));
+    PyArray1::from_vec(py, numbers).reshape([count, N])
+}
+
+/// Figures of residuals, in metres.
+pub fn residual_of<'py>(py: Python<'py>, residual: &ReportResidual) -> PyResult<Bound<'py, PyDict>> {
+    let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = *residual;
+    let figures = PyDict::new(py);
+    let all = [("rms_m", rms_m), ("max_m", max_m), ("mean_abs_m", mean_abs_m), ("p95_m", p95_m), ("p99_m", p99_m)];
+    all.into_iter().try_for_each(|(name, figure)| figures.set_item(name, figure))?;
+    Ok(figures)
 }

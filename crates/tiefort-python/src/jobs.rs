@@ -9,9 +9,9 @@ use pyo3::types::PyDict;
 use terrain::{ModuleId, TileId};
 use tiefort::library::{self, Failure, SystemClock};
 
+use crate::arrays::residual_of;
 use crate::meshes::{ARRAY, Placed, raster_of};
 use crate::raised::raised;
-use crate::tables::residual_of;
 use crate::waiting::{Raising, wait, wait_for};
 
 /// A job, read and found good.

@@ -12,7 +12,6 @@ mod arrays;
 mod command;
 mod jobs;
 mod meshes;
-mod tables;
 mod within;
 
 /// The compiled part of the package.

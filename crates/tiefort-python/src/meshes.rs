@@ -12,9 +12,8 @@ use source_files::{ArrayRaster, Crs, Raster};
 use terrain::{StopReason, metres_of_quanta};
 use tiefort::library::{self, Failure, SystemClock};
 
-use crate::arrays::{places, posts_of};
+use crate::arrays::{places, posts_of, residual_of, table};
 use crate::raised::raised;
-use crate::tables::{residual_of, table};
 use crate::waiting::wait;
 use crate::within::within;
 
