@@ -5,7 +5,7 @@ use crate::{FIXED_LINES_BYTES, HOLE_CLASS, LINE_BYTES, ReadError, Vertex};
 
 /// What kind of way a line is the middle of.
 #[repr(u8)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LineKind {
     /// A road, a rail or a runway.
     Travelled,
@@ -17,7 +17,7 @@ pub enum LineKind {
 
 /// What a line is in the ground, or as a deck.
 #[repr(u8)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LineForm {
     /// Nothing: it is left out, or runs in a tunnel.
     Nothing,
@@ -31,7 +31,7 @@ pub enum LineForm {
 
 /// Where a line runs.
 #[repr(u8)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum LineStorey {
     /// On the ground.
     Ground,
@@ -83,8 +83,7 @@ impl Line {
     /// What lines are sorted by.
     fn key(&self) -> impl Ord {
         let Self { class, kind, form, storey, is_kept, is_in_ground, width, ref vertices } = *self;
-        let places: Vec<(u16, u16, i32)> = vertices.iter().map(|vertex| (vertex.y, vertex.x, vertex.z)).collect();
-        (class, kind, form, storey, is_kept, is_in_ground, width, places)
+        (class, kind, form, storey, is_kept, is_in_ground, width, vertices)
     }
 }
 

@@ -12,9 +12,9 @@ use crate::{
 };
 
 /// Residuals over the posts that a load module owns, in quanta of 1/128 m.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Residual {
-    /// Posts counted.
+    /// Posts counted: owned and not void.
     pub posts: u32,
     /// Largest absolute residual.
     pub largest: u32,

@@ -1,8 +1,11 @@
 //! What the ground and the decks of a load module have in common.
 
+use std::cmp::Ordering;
+
 /// A vertex, in quanta of 1/128 m from the load module's south-west corner. It lies in memory as C would have it.
+/// Vertices are in order by y, then x, then z.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Vertex {
     /// East of the western side.
     pub x: u16,
@@ -10,4 +13,16 @@ pub struct Vertex {
     pub y: u16,
     /// Above the vertical datum.
     pub z: i32,
+}
+
+impl Ord for Vertex {
+    fn cmp(&self, other: &Self) -> Ordering {
+        (self.y, self.x, self.z).cmp(&(other.y, other.x, other.z))
+    }
+}
+
+impl PartialOrd for Vertex {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
 }

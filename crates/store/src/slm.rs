@@ -5,11 +5,11 @@ use std::path::Path;
 use load_module_reader::{
     Block, DECK_ENTRY_BYTES, FIXED_HEADER_BYTES, Header, INDEX_ENTRY_BYTES, LEVELS_MAX, MAGIC, Module, PART_DECKS,
     PART_LINES, PART_OBJECTS, PARTS_ENTRY_BYTES, QUANTA_PER_METRE, ReadError, SlmFile, VERSION, VERSION_OF_GROUND,
-    VERSION_WITH_DECKS, Vertex,
+    VERSION_WITH_DECKS,
 };
 use terrain::{
-    Decks, GridFrame, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine,
-    ModuleRect, ModuleResidual, ModuleVertex, Side, Spacing, TileId,
+    Decks, GridFrame, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine, ModuleRect, ModuleVertex, Side,
+    Spacing, TileId,
 };
 
 use crate::{DatabaseError, Fingerprint};
@@ -238,7 +238,7 @@ fn line_part(lines: &[ModuleLine]) -> Vec<u8> {
     put_u32s(&mut part, [lines.len() as u32, vertices as u32]);
     for ModuleLine { class, traits, vertices } in lines {
         let LineTraits { is_kept, is_in_ground, width, .. } = *traits;
-        let [kind, form, storey] = [traits.kind.number(), traits.form.number(), traits.storey.number()];
+        let [kind, form, storey] = [traits.kind as u8, traits.form as u8, traits.storey as u8];
         part.extend([*class, kind, form, u8::from(is_kept) | u8::from(is_in_ground) << 1 | storey << 2]);
         let count = u16::try_from(vertices.len()).expect("a line numbers its vertices in 16 bits");
         put_u16s(&mut part, [width, count]);
@@ -344,43 +344,28 @@ fn tile_of(header: &Header) -> TileModules {
 
 /// A load module as the reader gives it, whose square has sides of `side` quanta.
 pub fn load_module(module: &Module, side: u16) -> LoadModule {
-    let residual = &module.residual;
-    let vertices = |of: &[Vertex]| of.iter().map(|v| ModuleVertex { y: v.y, x: v.x, z: v.z }).collect();
     LoadModule {
         id: ModuleId { row: module.row, col: module.col },
         side,
-        vertices: vertices(&module.vertices),
+        vertices: module.vertices.clone(),
         triangles: module.triangles.clone(),
         classes: module.classes.clone(),
         polygon_count: module.polygon_count,
-        residual: ModuleResidual {
-            posts: residual.posts,
-            largest: residual.largest,
-            sum_abs: residual.sum_abs,
-            sum_squared: residual.sum_squared,
-        },
+        residual: module.residual,
         decks: Decks {
-            vertices: vertices(&module.decks.vertices),
+            vertices: module.decks.vertices.clone(),
             triangles: module.decks.triangles.clone(),
             classes: module.decks.classes.clone(),
         },
-        lines: module.lines.iter().map(|line| module_line(line, vertices(&line.vertices))).collect(),
+        lines: module.lines.iter().map(module_line).collect(),
         objects: module.objects.clone(),
     }
 }
 
-fn module_line(line: &load_module_reader::Line, vertices: Vec<ModuleVertex>) -> ModuleLine {
-    let load_module_reader::Line { class, kind, form, storey, is_kept, is_in_ground, width, vertices: _ } = *line;
-    // The reader numbers them as the file does.
-    let traits = LineTraits {
-        kind: LineKind::ALL[kind as usize],
-        form: LineForm::ALL[form as usize],
-        storey: LineStorey::ALL[storey as usize],
-        is_kept,
-        is_in_ground,
-        width,
-    };
-    ModuleLine { class, traits, vertices }
+fn module_line(line: &load_module_reader::Line) -> ModuleLine {
+    let load_module_reader::Line { class, kind, form, storey, is_kept, is_in_ground, width, ref vertices } = *line;
+    let traits = LineTraits { kind, form, storey, is_kept, is_in_ground, width };
+    ModuleLine { class, traits, vertices: vertices.clone() }
 }
 
 #[cfg(test)]

@@ -27,16 +27,17 @@ mod refined;
 mod tile;
 pub use refined::{GainCurve, GainRun, Refusal, RefusedBy, StopReason, TileTin};
 pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
-mod module_vertex;
-pub use module_vertex::ModuleVertex;
 mod decks;
 pub use decks::{DeckFault, Decks};
 mod module_line;
-pub use module_line::{LineFault, LineForm, LineKind, LineStorey, LineTraits, ModuleLine};
-// What stands on the ground is the same value here and in a file.
-pub use load_module_reader::{Canopy, Corner, ObjectKind, Objects, PRISMS_MAX, Prism};
+pub use module_line::{LineFault, LineTraits, ModuleLine};
+// A vertex, a residual, what a line is, and what stands on the ground are the same values here and in a file.
+pub use load_module_reader::{
+    Canopy, Corner, LineForm, LineKind, LineStorey, ObjectKind, Objects, PRISMS_MAX, Prism, Residual as ModuleResidual,
+    Vertex as ModuleVertex,
+};
 mod load_module;
-pub use load_module::{LoadModule, LoadModuleFault, ModuleCounts, ModuleResidual};
+pub use load_module::{LoadModule, LoadModuleFault, ModuleCounts};
 mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod materials;

@@ -1,6 +1,6 @@
 //! A load module: what the simulator loads at once.
 
-use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleVertex, Objects, module_line};
+use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleResidual, ModuleVertex, Objects, module_line};
 
 /// One finished load module.
 ///
@@ -37,19 +37,6 @@ pub struct ModuleCounts {
     pub triangles: u32,
     /// Convex polygons of the ground, and triangles of decks.
     pub polygons: u32,
-}
-
-/// Residuals over the posts a load module owns, in quanta of 1/128 m.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ModuleResidual {
-    /// Posts counted: owned and not void.
-    pub posts: u32,
-    /// Largest absolute residual.
-    pub largest: u32,
-    /// Sum of absolute residuals.
-    pub sum_abs: u64,
-    /// Sum of squared residuals.
-    pub sum_squared: u64,
 }
 
 /// What is wrong with a load module.

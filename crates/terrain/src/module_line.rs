@@ -3,71 +3,43 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::numbered::numbered;
-use crate::{HOLE_CLASS, ModuleVertex};
+use crate::{HOLE_CLASS, LineForm, LineKind, LineStorey, ModuleVertex};
 
-/// What kind of way a line is the middle of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LineKind {
-    /// A road, a rail or a runway.
-    Travelled,
-    /// A river or a stream; its vertices run downstream.
-    Channel,
-    /// A line that a job names.
-    Breakline,
+/// Writes what a line is as its number in files, and reads it.
+macro_rules! by_number {
+    ($module:ident, $of:ident) => {
+        mod $module {
+            use serde::de::{Deserialize, Deserializer, Error};
+
+            use super::$of;
+
+            pub fn serialize<S: serde::Serializer>(value: &$of, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_u8(*value as u8)
+            }
+
+            pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<$of, D::Error> {
+                let number = u8::deserialize(deserializer)?;
+                let unknown = || format!("found {} {number}, expected below {}", stringify!($of), $of::ALL.len());
+                $of::ALL.get(usize::from(number)).copied().ok_or_else(|| D::Error::custom(unknown()))
+            }
+        }
+    };
 }
-
-/// What a line is in the ground, or as a deck.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LineForm {
-    /// Nothing: it is left out, or runs in a tunnel.
-    Nothing,
-    /// Edges along its middle.
-    Line,
-    /// Edges on both sides.
-    Strip,
-    /// A strip with slopes beside it.
-    Bench,
-}
-
-/// Where a line runs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LineStorey {
-    /// On the ground.
-    Ground,
-    /// On a bridge.
-    Bridge,
-    /// In a tunnel.
-    Tunnel,
-}
-
-impl LineKind {
-    /// All of them, by their numbers in files.
-    pub const ALL: [Self; 3] = [Self::Travelled, Self::Channel, Self::Breakline];
-}
-
-impl LineForm {
-    /// All of them, by their numbers in files.
-    pub const ALL: [Self; 4] = [Self::Nothing, Self::Line, Self::Strip, Self::Bench];
-}
-
-impl LineStorey {
-    /// All of them, by their numbers in files.
-    pub const ALL: [Self; 3] = [Self::Ground, Self::Bridge, Self::Tunnel];
-}
-
-numbered!(LineKind);
-numbered!(LineForm);
-numbered!(LineStorey);
+by_number!(kind, LineKind);
+by_number!(form, LineForm);
+by_number!(storey, LineStorey);
 
 /// All of a line but its class and its vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct LineTraits {
     /// What kind of way.
+    #[serde(with = "kind")]
     pub kind: LineKind,
     /// What it is in the ground.
+    #[serde(with = "form")]
     pub form: LineForm,
     /// Where it runs.
+    #[serde(with = "storey")]
     pub storey: LineStorey,
     /// Whether the budget keeps its way: what is not kept is left out of the ground.
     pub is_kept: bool,
