@@ -8,6 +8,7 @@ use std::collections::HashMap;
 
 use source_files::Crs;
 use store::Area;
+use terrain::geometry::nearest_share;
 use terrain::plans::{Plan, common, difference};
 use terrain::{Decks, HOLE_CLASS, LoadModule, ModuleVertex, Objects, Prism, QUANTA_PER_METRE};
 
@@ -240,8 +241,7 @@ fn has_wall_at(ring: &[terrain::Corner], [x, y]: [f64; 2]) -> bool {
     let passes = |(a, b): (&terrain::Corner, &terrain::Corner)| {
         let [along_x, along_y] = [f64::from(b.x) - f64::from(a.x), f64::from(b.y) - f64::from(a.y)];
         let [to_x, to_y] = [x - f64::from(a.x), y - f64::from(a.y)];
-        let whole = along_x * along_x + along_y * along_y;
-        let share = ((to_x * along_x + to_y * along_y) / whole.max(1.0)).clamp(0.0, 1.0);
+        let share = nearest_share([along_x, along_y], [to_x, to_y]);
         let [off_x, off_y] = [to_x - share * along_x, to_y - share * along_y];
         a.has_wall && off_x * off_x + off_y * off_y <= 4.0
     };

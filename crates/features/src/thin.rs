@@ -3,6 +3,8 @@
 //! Stations on tile and load-module lines stay, and so do those that others share; no edge that results is steeper
 //! than its grade.
 
+use terrain::geometry::nearest_share;
+
 use crate::{FeatureLattice, Place};
 
 /// How far a thinned line may lie from its stations.
@@ -78,8 +80,7 @@ fn is_too_steep(a: Station, b: Station, grade_ppm: u32, lattice: FeatureLattice)
 fn excess(a: Station, b: Station, station: Station, aside: f64, height: f64) -> f64 {
     let ([east, north], [to_east, to_north]) =
         (a.place.to(b.place).map(|d| d as f64), a.place.to(station.place).map(|d| d as f64));
-    let squared = east * east + north * north;
-    let along = if 0.0 < squared { ((east * to_east + north * to_north) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    let along = nearest_share([east, north], [to_east, to_north]);
     let (off_east, off_north) = (to_east - along * east, to_north - along * north);
     let off = (off_east * off_east + off_north * off_north).sqrt();
     let level = f64::from(a.height) + along * f64::from(b.height - a.height);

@@ -6,6 +6,7 @@
 
 use std::collections::HashMap;
 
+use terrain::geometry::nearest_share;
 use terrain::{LatticePoint, QUANTA_PER_METRE, Role, SideSlope, Vertex};
 
 use crate::{Place, Strand};
@@ -101,8 +102,7 @@ fn run_of(off: f64) -> f64 {
 pub fn nearest_on([a, b]: [Vertex; 2], at: LatticePoint) -> (f64, f64) {
     let to = |end: LatticePoint| [end.col - a.at.col, end.row - a.at.row].map(f64::from);
     let ([along_x, along_y], [x, y]) = (to(b.at), to(at));
-    let whole = along_x * along_x + along_y * along_y;
-    let share = if whole == 0.0 { 0.0 } else { ((x * along_x + y * along_y) / whole).clamp(0.0, 1.0) };
+    let share = nearest_share([along_x, along_y], [x, y]);
     let (off_x, off_y) = (x - share * along_x, y - share * along_y);
     ((off_x * off_x + off_y * off_y).sqrt(), share)
 }

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+use terrain::geometry::nearest_share;
 use terrain::{
     Dem, FeatureSurface, Features, LatticePoint, LoadModule, Post, PostRect, QUANTA_PER_METRE, SurfaceGround,
     TileFeatures,
@@ -344,8 +345,7 @@ fn posts_near(a: LatticePoint, b: LatticePoint, steps: i32, rect: PostRect) -> i
 fn is_within(a: LatticePoint, b: LatticePoint, at: LatticePoint, steps: i32) -> bool {
     let to = |end: LatticePoint| [end.col - a.col, end.row - a.row].map(f64::from);
     let ([along_x, along_y], [x, y]) = (to(b), to(at));
-    let whole = along_x * along_x + along_y * along_y;
-    let share = if whole == 0.0 { 0.0 } else { ((x * along_x + y * along_y) / whole).clamp(0.0, 1.0) };
+    let share = nearest_share([along_x, along_y], [x, y]);
     let (off_x, off_y) = (x - share * along_x, y - share * along_y);
     off_x * off_x + off_y * off_y <= f64::from(steps) * f64::from(steps)
 }

@@ -29,3 +29,10 @@ mod bounds;
 pub use bounds::{BEYOND_LEAST, height_bounds, height_bounds_in};
 mod ridge;
 pub use ridge::is_ridge_candidate;
+
+/// How far along an edge its place nearest to another lies, from 0 to 1; both are seen from where the edge begins.
+#[inline]
+pub fn nearest_share([along_x, along_y]: [f64; 2], [x, y]: [f64; 2]) -> f64 {
+    let squared = along_x * along_x + along_y * along_y;
+    if squared == 0.0 { 0.0 } else { ((x * along_x + y * along_y) / squared).clamp(0.0, 1.0) }
+}
