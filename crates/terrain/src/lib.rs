@@ -10,7 +10,7 @@ pub use post::{Post, PostRect};
 mod lattice;
 pub use lattice::{LATTICE_PER_POST, LatticePoint};
 mod units;
-pub use units::{GridFrame, Metres, QUANTA_PER_METRE, Spacing, metres_of_quanta, quanta_of_metres};
+pub use units::{DEGREE_M, GridFrame, Metres, QUANTA_PER_METRE, Spacing, metres_of_quanta, quanta_of_metres};
 mod dem;
 pub use dem::Dem;
 mod importance;

@@ -4,6 +4,8 @@ use super::Post;
 
 /// Height quanta in a metre; every height the compiler handles is a whole number of them.
 pub const QUANTA_PER_METRE: i32 = 128;
+/// Metres of a degree of latitude, about.
+pub const DEGREE_M: f64 = 111_320.0;
 
 /// A length in metres, where a bare number could be mistaken for posts or quanta.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]

@@ -7,7 +7,7 @@ use job::{DemSource, Job, Resampling, SourceFile, Voids};
 #[cfg(feature = "geoparquet")]
 use source_files::{Crs, GeoParquet, Wanted, groups_near};
 use source_files::{DemFile, SourceError, WideMosaic, Windows, read_polygons, window_under};
-use terrain::GridFrame;
+use terrain::{DEGREE_M, GridFrame};
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
@@ -121,8 +121,6 @@ pub struct Needed {
 /// # Errors
 /// When the raster or the system of the area cannot be used.
 pub fn needed(job: &Job, file: &SourceFile, path: &Path) -> Result<Needed, GroundError> {
-    /// Metres of a degree of latitude, about.
-    const DEGREE_M: f64 = 111_320.0;
     let (opened, crs) = (DemFile::open(path, &reading(file, false)?)?, area_crs(job)?);
     let [east_m, north_m] = job.area.origin_m;
     let grid = GridFrame { origin_east_m: east_m, origin_north_m: north_m, spacing: job.area.spacing };

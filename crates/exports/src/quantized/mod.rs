@@ -15,7 +15,7 @@ use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
-use terrain::HOLE_CLASS;
+use terrain::{DEGREE_M, HOLE_CLASS};
 
 use crate::earth::{Earth, directions, earth_centred};
 use crate::globe::Globe;
@@ -29,8 +29,6 @@ use crate::{Datum, ExportError, Product, Put, Work};
 
 /// Load modules along a tile of the finest level, about.
 const MODULES_PER_TILE: f64 = 5.0;
-/// Metres in a degree of latitude.
-const DEGREE_M: f64 = 111_320.0;
 /// Squares of heights along a side of a tile above the finest level.
 const GRID: i64 = 64;
 /// Level, column and row of a tile, these from the south-west.
