@@ -20,7 +20,7 @@ use terrain::{
     metres_of_quanta,
 };
 
-use crate::verify::read_modules;
+use crate::measures::read_modules;
 
 /// Where a database is not good enough.
 #[derive(Clone, Debug)]

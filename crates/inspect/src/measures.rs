@@ -1,5 +1,6 @@
 //! Fidelity of a finished database or of a plain mesh, always beside the regular grid of as many triangles.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -10,9 +11,7 @@ use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
 use schedule::Workers;
 use serde::Serialize;
 use store::{Folder, Totals};
-use terrain::{Dem, Importance, LoadModule, Metres, QUANTA_PER_METRE, Tin};
-
-use crate::verify::read_modules;
+use terrain::{Dem, Importance, LoadModule, Metres, ModuleId, QUANTA_PER_METRE, Tin};
 
 /// Which pairs of places a line of sight is tried between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -259,4 +258,14 @@ fn built_residual(totals: &Totals) -> BuiltResidual {
         mean_abs_m: totals.residual_sum_abs as f64 / posts / metre,
         max_m: totals.residual_largest as f64 / metre,
     }
+}
+
+/// All load modules by place, at their finest level, checked one by one as they are decoded.
+pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
+    let mut all = BTreeMap::new();
+    for &tile in &area.tiles {
+        let (_, modules) = folder.read_modules(tile)?;
+        all.extend(modules.into_iter().map(|module| (module.id, module)));
+    }
+    Ok(all)
 }

@@ -19,7 +19,6 @@ mod walk;
 mod waters;
 mod ways;
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 use std::sync::atomic::AtomicBool;
@@ -193,16 +192,6 @@ fn listed(manifest: &Manifest) -> usize {
             .count()
     };
     manifest.tiles.iter().map(of_tile).sum::<usize>() + manifest.files.len()
-}
-
-/// All load modules by place, at their finest level, checked one by one as they are decoded.
-pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
-    let mut all = BTreeMap::new();
-    for &tile in &area.tiles {
-        let (_, modules) = folder.read_modules(tile)?;
-        all.extend(modules.into_iter().map(|module| (module.id, module)));
-    }
-    Ok(all)
 }
 
 /// What was built, where, and by which algorithms.
