@@ -92,7 +92,7 @@ fn rms_by_module(scene: &Scene, scale_m: f64, map_extent: MapExtent) -> Drawing 
     let all = of_scene(scene);
     let mut map = Image::new(map_extent.pixels[0], map_extent.pixels[1], NOTHING);
     for (module, residual) in scene.part.iter().zip(&all) {
-        if let Some(rms_m) = rms_m(residual) {
+        if let Some(rms_m) = residual.rms_m() {
             fill(&mut map, scene, &map_extent, one(module), ERRORS.at(rms_m / scale_m));
         }
     }
@@ -142,11 +142,6 @@ fn of_scene(scene: &Scene) -> Vec<ModuleResidual> {
         }
     }
     all
-}
-
-fn rms_m(residual: &ModuleResidual) -> Option<f64> {
-    let mean = residual.sum_squared as f64 / f64::from(residual.posts.max(1));
-    (0 < residual.posts).then(|| mean.sqrt() / f64::from(QUANTA_PER_METRE))
 }
 
 /// RMS and largest of all, in words.
@@ -201,6 +196,6 @@ mod tests {
         let ground = Some(SceneGround { dem: &dem, residuals: &residuals });
         let all = of_scene(&Scene { ground, ..samples::scene(&modules, &limits) });
         assert_eq!(all.iter().map(|residual| residual.posts).collect::<Vec<_>>(), [399, 400, 420, 420, 420, 441]);
-        assert!(all.iter().all(|residual| rms_m(residual) == Some(2.0)));
+        assert!(all.iter().all(|residual| residual.rms_m() == Some(2.0)));
     }
 }
