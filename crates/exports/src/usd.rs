@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 
-use terrain::{ModuleRect, QUANTA_PER_METRE, TileId};
+use terrain::{ModuleRect, TileId, metres_of_quanta};
 
 use crate::detail::{Detail, Step, steps};
 use crate::mesh::Part;
@@ -101,7 +101,7 @@ fn area_text(levels: &[&Product], tiles: &[Tile]) -> String {
 /// A tile at its place: its file, or a variant for each of its levels, the finest of which is chosen.
 fn put_tile(text: &mut String, levels: &[&Product], tile: &Tile) {
     let product = levels[0];
-    let (name, [x, y]) = (&tile.name, corner(product, tile).map(metres));
+    let (name, [x, y]) = (&tile.name, corner(product, tile).map(metres_of_quanta));
     let payload = |level: usize| format!("prepend payload = @./{}@", tile.file(level, product));
     let _ = writeln!(text, "    def Xform \"{name}\" (\n        kind = \"component\"");
     let _ = match levels {
@@ -249,7 +249,7 @@ fn put_mesh(text: &mut String, drawn: &Drawn) {
     let collides = *sheet != Sheet::Ribbons && thing.is_none_or(|thing| thing.kind.is_prism());
     let _ = writeln!(text, "\n    def Mesh \"{name}\"{}\n    {{", if collides { COLLIDES } else { "" });
     if let Some(thing) = thing {
-        let (id, class, height) = (thing.id, thing.kind.name(), metres(thing.height));
+        let (id, class, height) = (thing.id, thing.kind.name(), metres_of_quanta(thing.height));
         let _ = writeln!(
             text,
             "        custom uint64 object:id = {id}\n        custom string object:class = \"{class}\"\n        \
@@ -323,12 +323,8 @@ fn put_list<T: std::fmt::Display>(text: &mut String, what: &str, items: impl Int
 }
 
 /// Whole 1/128 m, as decimals without an end cut off.
-fn metres(quanta: i32) -> f64 {
-    f64::from(quanta) / f64::from(QUANTA_PER_METRE)
-}
-
 fn point([x, y, z]: [i32; 3]) -> String {
-    format!("({}, {}, {})", metres(x), metres(y), metres(z))
+    format!("({}, {}, {})", metres_of_quanta(x), metres_of_quanta(y), metres_of_quanta(z))
 }
 
 /// The name of a material where names are identifiers: each has another.
