@@ -83,10 +83,7 @@ impl Decks {
 
     /// Doubled area of a triangle seen from above, in squared quanta; positive when counter-clockwise.
     pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
-        let [a, b, c] = triangle.map(|v| self.vertices[usize::from(v)]);
-        let (bx, by) = (i64::from(b.x) - i64::from(a.x), i64::from(b.y) - i64::from(a.y));
-        let (cx, cy) = (i64::from(c.x) - i64::from(a.x), i64::from(c.y) - i64::from(a.y));
-        bx * cy - by * cx
+        doubled_area(&self.vertices, triangle)
     }
 
     /// Walks every invariant of decks in a square of `side` quanta: lengths, order, places, orientation, classes. They
@@ -123,6 +120,14 @@ impl Decks {
         let hole = self.classes.iter().position(|&class| class == HOLE_CLASS);
         hole.map_or(Ok(()), |triangle| Err(DeckFault::HoleClass(triangle)))
     }
+}
+
+/// Doubled area of a triangle seen from above, in squared quanta; positive when counter-clockwise.
+pub(crate) fn doubled_area(vertices: &[ModuleVertex], triangle: [u16; 3]) -> i64 {
+    let [a, b, c] = triangle.map(|v| vertices[usize::from(v)]);
+    let (bx, by) = (i64::from(b.x) - i64::from(a.x), i64::from(b.y) - i64::from(a.y));
+    let (cx, cy) = (i64::from(c.x) - i64::from(a.x), i64::from(c.y) - i64::from(a.y));
+    bx * cy - by * cx
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! A load module: what the simulator loads at once.
 
+use crate::decks::doubled_area;
 use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleResidual, ModuleVertex, Objects, module_line};
 
 /// One finished load module.
@@ -86,10 +87,7 @@ impl std::fmt::Display for LoadModuleFault {
 impl LoadModule {
     /// Doubled area of a triangle in squared quanta; positive when counter-clockwise.
     pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
-        let [a, b, c] = triangle.map(|v| self.vertices[usize::from(v)]);
-        let (bx, by) = (i64::from(b.x) - i64::from(a.x), i64::from(b.y) - i64::from(a.y));
-        let (cx, cy) = (i64::from(c.x) - i64::from(a.x), i64::from(c.y) - i64::from(a.y));
-        bx * cy - by * cx
+        doubled_area(&self.vertices, triangle)
     }
 
     /// What counts against limits: a simulator draws decks as it draws the ground, so each of their triangles counts as
