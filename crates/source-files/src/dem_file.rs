@@ -137,8 +137,8 @@ impl DemFile {
         match &self.reader {
             Reader::GeoTiff(tiff) => tiff.chunks_of(cut),
             Reader::Dted(dted) => dted.chunks_of(cut.west, cut.east).collect(),
-            Reader::Rows(rows) => rows.chunks_of(cut.south, cut.north).collect(),
-            Reader::Ascii(grid) => grid.chunks_of(cut.south, cut.north).collect(),
+            Reader::Rows(rows) => rows.chunks().holding(cut.south, cut.north).collect(),
+            Reader::Ascii(grid) => grid.chunks().holding(cut.south, cut.north).collect(),
         }
     }
 
@@ -147,8 +147,8 @@ impl DemFile {
         match &self.reader {
             Reader::GeoTiff(tiff) => tiff.posts_of(chunk),
             Reader::Dted(dted) => dted.posts_of(chunk),
-            Reader::Rows(rows) => rows.posts_of(chunk),
-            Reader::Ascii(grid) => grid.posts_of(chunk),
+            Reader::Rows(rows) => rows.chunks().posts_of(chunk),
+            Reader::Ascii(grid) => grid.chunks().posts_of(chunk),
         }
     }
 

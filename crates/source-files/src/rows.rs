@@ -1,5 +1,7 @@
 //! Rasters that are nothing but rows of numbers: SRTM's HGT, and raw grids with a header beside them.
 
+use std::ops::RangeInclusive;
+
 use terrain::PostRect;
 
 use crate::SourceError;
@@ -27,6 +29,29 @@ pub(crate) struct Rows {
     pub nodata: Option<f64>,
 }
 
+/// A raster in chunks of so many whole rows each, counted from the north.
+#[derive(Clone, Copy)]
+pub(crate) struct RowChunks {
+    pub cols: u32,
+    pub rows: u32,
+    pub rows_per_chunk: u32,
+}
+
+impl RowChunks {
+    pub(crate) fn posts_of(self, chunk: u32) -> PostRect {
+        let first = chunk * self.rows_per_chunk;
+        let last = (first + self.rows_per_chunk).min(self.rows) - 1;
+        let row = |stored: u32| (self.rows - 1 - stored) as i32;
+        PostRect { south: row(last), west: 0, north: row(first), east: self.cols as i32 - 1 }
+    }
+
+    /// The chunks that hold some rows, counted from the south.
+    pub(crate) fn holding(self, south: i32, north: i32) -> RangeInclusive<u32> {
+        let chunk = |row: i32| (self.rows - 1 - row as u32) / self.rows_per_chunk;
+        chunk(north)..=chunk(south)
+    }
+}
+
 impl Rows {
     /// Checks that all rows are there.
     pub(crate) fn check(&self) -> Result<(), SourceError> {
@@ -39,26 +64,16 @@ impl Rows {
         Header { frame, scale, kind: self.kind, nodata: self.nodata, shift: None }
     }
 
-    fn rows_per_chunk(&self) -> u32 {
-        (CHUNK_BYTES / self.row_bytes.max(1)).clamp(1, u64::from(self.rows)) as u32
-    }
-
-    pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {
-        let first = chunk * self.rows_per_chunk();
-        let last = (first + self.rows_per_chunk()).min(self.rows) - 1;
-        let row = |stored: u32| (self.rows - 1 - stored) as i32;
-        PostRect { south: row(last), west: 0, north: row(first), east: self.cols as i32 - 1 }
-    }
-
-    /// The chunks that hold some rows, counted from the south.
-    pub(crate) fn chunks_of(&self, south: i32, north: i32) -> std::ops::RangeInclusive<u32> {
-        let chunk = |row: i32| (self.rows - 1 - row as u32) / self.rows_per_chunk();
-        chunk(north)..=chunk(south)
+    /// How its rows fall into chunks.
+    pub(crate) fn chunks(&self) -> RowChunks {
+        let rows_per_chunk = (CHUNK_BYTES / self.row_bytes.max(1)).clamp(1, u64::from(self.rows)) as u32;
+        RowChunks { cols: self.cols, rows: self.rows, rows_per_chunk }
     }
 
     pub(crate) fn decode(&self, chunk: u32) -> Result<Chunk, SourceError> {
-        let posts = self.posts_of(chunk);
-        let first = u64::from(chunk * self.rows_per_chunk());
+        let chunks = self.chunks();
+        let posts = chunks.posts_of(chunk);
+        let first = u64::from(chunk * chunks.rows_per_chunk);
         let wide = self.cols as usize * self.kind.bytes() as usize;
         let (at, size) = (self.skipped + first * self.row_bytes, self.row_bytes as usize);
         // The last row of a file need not have the padding that others have.

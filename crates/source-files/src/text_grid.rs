@@ -1,17 +1,14 @@
 //! Esri's ASCII grid, and the header beside a raw grid, which is written in the same way.
 
 use std::io::{BufRead, BufReader, Read};
-use std::ops::RangeInclusive;
 use std::sync::{Arc, OnceLock};
-
-use terrain::PostRect;
 
 use crate::SourceError;
 use crate::chunk::{Chunk, Header};
 use crate::directory::SampleKind;
 use crate::frame::{Axes, SampleScale};
 use crate::limits::POSTS_A_SIDE_MAX;
-use crate::rows::Rows;
+use crate::rows::{RowChunks, Rows};
 use crate::samples::Samples;
 use crate::store::{Handle, Store};
 
@@ -229,17 +226,9 @@ impl AsciiGrid {
         (CHUNK_POSTS / self.cols).clamp(1, self.rows)
     }
 
-    /// The chunks that hold some rows, counted from the south.
-    pub(crate) fn chunks_of(&self, south: i32, north: i32) -> RangeInclusive<u32> {
-        let chunk = |row: i32| (self.rows - 1 - row as u32) / self.rows_per_chunk();
-        chunk(north)..=chunk(south)
-    }
-
-    pub(crate) fn posts_of(&self, chunk: u32) -> PostRect {
-        let first = chunk * self.rows_per_chunk();
-        let last = (first + self.rows_per_chunk()).min(self.rows) - 1;
-        let row = |stored: u32| (self.rows - 1 - stored) as i32;
-        PostRect { south: row(last), west: 0, north: row(first), east: self.cols as i32 - 1 }
+    /// How its rows fall into chunks.
+    pub(crate) fn chunks(&self) -> RowChunks {
+        RowChunks { cols: self.cols, rows: self.rows, rows_per_chunk: self.rows_per_chunk() }
     }
 
     pub(crate) fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
@@ -278,7 +267,7 @@ impl AsciiGrid {
     }
 
     pub(crate) fn decode_rows(&self, chunk: u32) -> Result<Chunk, SourceError> {
-        let posts = self.posts_of(chunk);
+        let posts = self.chunks().posts_of(chunk);
         let mut reader = self.reader_at(self.starts()?[chunk as usize])?;
         let before = chunk as usize * self.rows_per_chunk() as usize * self.cols as usize;
         let mut samples: Vec<f32> = Vec::with_capacity(posts.post_count());
