@@ -11,6 +11,7 @@ use terrain::Role;
 use views::outcome;
 
 use crate::product::ProductError;
+use crate::product::told::length_m;
 
 const LINES: Layer = Layer {
     name: "lines",
@@ -183,11 +184,6 @@ fn add_remarks(package: &Package, layers: &FeatureLayers) -> rusqlite::Result<()
         add.execute(params![at_m.map(|place| point(package.srs, place)), feature, outcome(remark), found, done])?;
     }
     Ok(())
-}
-
-fn length_m(a: [f64; 3], b: [f64; 3]) -> f64 {
-    let [east, north] = [b[0] - a[0], b[1] - a[1]];
-    (east * east + north * north).sqrt()
 }
 
 #[cfg(test)]

@@ -270,7 +270,8 @@ fn sum_km(metres: impl Iterator<Item = f64>) -> f64 {
     metres.fold(0.0, |sum, metres| sum + metres) / 1000.0
 }
 
-fn length_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+/// How far two places lie apart, seen from above, in metres.
+pub(crate) fn length_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     let [east, north] = [b[0] - a[0], b[1] - a[1]];
     (east * east + north * north).sqrt()
 }
