@@ -15,7 +15,7 @@ fn site() -> Site {
 }
 
 /// A straight way between two positions in posts, with the number of the first of them that it has one with.
-fn way(number: i64, tags: &str, line: &[(f64, f64)]) -> Source {
+pub fn way(number: i64, tags: &str, line: &[(f64, f64)]) -> Source {
     let tags = tags.split(' ').filter_map(|tag| tag.split_once('='));
     let tags = tags.map(|(key, value)| (key.to_owned(), value.to_owned())).collect();
     let shape = Shape::Line(line.iter().map(|&(east, north)| Position::new(east, north)).collect());

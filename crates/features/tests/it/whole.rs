@@ -6,16 +6,11 @@ use features::*;
 use proptest::prelude::*;
 use terrain::{Post, PostRect, Spacing, in_turn};
 
+use crate::networks::way;
+
 fn site() -> Site {
     let area = PostRect::new(Post::new(0, 0), Post::new(80, 80));
     Site::new(Spacing::from_metres(10.0).unwrap(), area, 20, 40)
-}
-
-fn feature(number: i64, tags: &str, line: &[(f64, f64)]) -> Source {
-    let tags = tags.split(' ').filter_map(|tag| tag.split_once('='));
-    let tags = tags.map(|(key, value)| (key.to_owned(), value.to_owned())).collect();
-    let shape = Shape::Line(line.iter().map(|&(east, north)| Position::new(east, north)).collect());
-    Source { id: FeatureId { source: 0, numbering: Numbering::Way, number }, tags, kind: None, shape }
 }
 
 /// A tag by number, and places in halves of a post.
@@ -140,14 +135,14 @@ fn hills(east: f64, north: f64) -> f64 {
 fn a_small_landscape_is_whole() {
     let lake = [(30.0, 30.0), (45.0, 32.0), (46.0, 44.0), (31.0, 45.0), (30.0, 30.0)];
     let sources = vec![
-        feature(1, "highway=primary", &[(5.0, 10.0), (70.0, 12.0)]),
-        feature(2, "highway=track width=wide", &[(20.0, 5.0), (25.0, 40.0), (22.0, 70.0)]),
-        feature(3, "waterway=river", &[(5.0, 38.0), (31.0, 38.0), (45.5, 38.0), (75.0, 36.0)]),
-        feature(4, "natural=water ele=205", &lake),
-        feature(5, "highway=motorway bridge=yes", &[(60.0, 20.0), (60.0, 50.0)]),
-        feature(6, "highway=motorway", &[(60.0, 0.0), (60.0, 20.0)]),
-        feature(7, "highway=motorway", &[(60.0, 50.0), (60.0, 79.0)]),
-        feature(8, "railway=rail tunnel=yes", &[(10.0, 60.0), (70.0, 60.0)]),
+        way(1, "highway=primary", &[(5.0, 10.0), (70.0, 12.0)]),
+        way(2, "highway=track width=wide", &[(20.0, 5.0), (25.0, 40.0), (22.0, 70.0)]),
+        way(3, "waterway=river", &[(5.0, 38.0), (31.0, 38.0), (45.5, 38.0), (75.0, 36.0)]),
+        way(4, "natural=water ele=205", &lake),
+        way(5, "highway=motorway bridge=yes", &[(60.0, 20.0), (60.0, 50.0)]),
+        way(6, "highway=motorway", &[(60.0, 0.0), (60.0, 20.0)]),
+        way(7, "highway=motorway", &[(60.0, 50.0), (60.0, 79.0)]),
+        way(8, "railway=rail tunnel=yes", &[(10.0, 60.0), (70.0, 60.0)]),
     ];
     let whole = all_stages(sources, &hills, 100_000);
     check(&whole, 100_000);
@@ -174,7 +169,7 @@ proptest! {
             "waterway=river"];
         let of = |(number, (tag, line)): (usize, &Drawn)| {
             let line: Vec<(f64, f64)> = line.iter().map(|(x, y)| (f64::from(*x) / 2.0, f64::from(*y) / 2.0)).collect();
-            feature(number as i64, tags[*tag], &line)
+            way(number as i64, tags[*tag], &line)
         };
         let sources: Vec<Source> = lines.iter().enumerate().map(of).collect();
         let there = all_stages(sources.clone(), &hills, most);
