@@ -128,12 +128,13 @@ fn leave_out_displaced(sound: &mut Vec<(Position, Place)>, notes: &mut Notes) {
     });
 }
 
-/// Takes out tips from which a line comes back within a metre of where it went.
-pub fn leave_out_spikes(places: &mut Vec<Place>, notes: &mut Notes) {
+/// Takes out tips from which a line comes back within a metre of where it went, but for those at which it meets others:
+/// two carriageways that close at a junction are drawn so.
+pub fn leave_out_spikes(places: &mut Vec<Place>, is_junction: &dyn Fn(Place) -> bool, notes: &mut Notes) {
     let mut kept: Vec<Place> = Vec::with_capacity(places.len());
     for &place in places.iter() {
         while let [.., before, tip] = kept[..] {
-            if before != place && !is_spike(before, tip, place, notes.lattice) {
+            if is_junction(tip) || before != place && !is_spike(before, tip, place, notes.lattice) {
                 break;
             }
             notes.write_at(tip, Flaw::Spike, Remedy::PointLeftOut);
@@ -148,7 +149,7 @@ pub fn leave_out_spikes(places: &mut Vec<Place>, notes: &mut Notes) {
 
 /// The same for a ring, whose first place is not repeated.
 pub fn leave_out_spikes_of_ring(ring: &mut Vec<Place>, notes: &mut Notes) {
-    leave_out_spikes(ring, notes);
+    leave_out_spikes(ring, &|_| false, notes);
     while 3 <= ring.len() && ring.first() == ring.last() {
         ring.pop();
     }
@@ -190,7 +191,7 @@ mod tests {
         let mut notes = Notes { id, lattice, remarks: &mut remarks };
         let positions: Vec<Position> = positions.iter().map(|&(east, north)| Position::new(east, north)).collect();
         let mut places = clean(&positions, &mut notes).places;
-        leave_out_spikes(&mut places, &mut notes);
+        leave_out_spikes(&mut places, &|_| false, &mut notes);
         (
             places.iter().map(|place| (place.col, place.row)).collect(),
             remarks.into_iter().map(|remark| remark.flaw).collect(),

@@ -1,6 +1,6 @@
 //! Mends features: what comes out are ways and areas on the lattice, and a remark for whatever was changed.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use crate::clean::{Cleaned, Notes, clean, leave_out_spikes, leave_out_spikes_of_ring};
 use crate::clip::Extent;
@@ -24,11 +24,12 @@ pub struct Mended {
 pub fn mend(features: Vec<Feature>, site: &Site) -> Mended {
     let (lattice, extent) = (site.lattice, site.extent);
     let mut mended = Mended { ways: Vec::new(), areas: Vec::new(), remarks: Vec::new() };
+    let junctions = junctions(&features, lattice);
     for feature in features {
         let mut notes = Notes { id: feature.id, lattice, remarks: &mut mended.remarks };
         let found = match &feature.shape {
             Shape::Line(positions) if feature.traits.form != Form::Polygon => {
-                let ways = ways_of(&feature, positions, extent, &mut notes);
+                let ways = ways_of(&feature, positions, (extent, &junctions), &mut notes);
                 let any = !ways.is_empty();
                 mended.ways.extend(ways);
                 any
@@ -61,14 +62,35 @@ fn order(mended: &mut Mended) {
     mended.areas.sort_by(|a, b| (&a.traits, &a.walks, a.id).cmp(&(&b.traits, &b.walks, b.id)));
 }
 
-fn ways_of(feature: &Feature, positions: &[Position], extent: Extent, notes: &mut Notes) -> Vec<Way> {
+/// Places that lines of two features have, with the family of both.
+fn junctions(features: &[Feature], lattice: FeatureLattice) -> HashSet<(u8, Place)> {
+    let (mut first, mut junctions) = (HashMap::new(), HashSet::new());
+    for (number, feature) in features.iter().enumerate() {
+        let Shape::Line(positions) = &feature.shape else { continue };
+        for place in positions.iter().filter_map(|at| lattice.place_of([at.east, at.north])) {
+            let at = (gaps::family(feature.traits.kind), place);
+            if *first.entry(at).or_insert(number) != number {
+                junctions.insert(at);
+            }
+        }
+    }
+    junctions
+}
+
+fn ways_of(
+    feature: &Feature,
+    positions: &[Position],
+    (extent, junctions): (Extent, &HashSet<(u8, Place)>),
+    notes: &mut Notes,
+) -> Vec<Way> {
     let Cleaned { mut places, mut heights } = clean(positions, notes);
     let first = places.first().copied();
     if places.len() < 2 {
         notes.write_of(first, Flaw::ZeroLength, Remedy::LeftOut);
         return Vec::new();
     }
-    leave_out_spikes(&mut places, notes);
+    let family = gaps::family(feature.traits.kind);
+    leave_out_spikes(&mut places, &|place| junctions.contains(&(family, place)), notes);
     if places.len() < 2 {
         notes.write_of(first, Flaw::ZeroLength, Remedy::LeftOut);
         return Vec::new();
@@ -81,7 +103,7 @@ fn ways_of(feature: &Feature, positions: &[Position], extent: Extent, notes: &mu
         notes.write_of(first, Flaw::Outside, Remedy::LeftOut);
     }
     let of_part = |places: Vec<Place>| {
-        let held: std::collections::HashSet<Place> = places.iter().copied().collect();
+        let held: HashSet<Place> = places.iter().copied().collect();
         let heights = heights.iter().copied().filter(|(place, _)| held.contains(place)).collect();
         Way { traits: feature.traits, places, heights, id: feature.id }
     };
@@ -206,6 +228,24 @@ mod tests {
         let copy = source(2, ("highway", "track"), &back);
         let rounded = check(vec![copy, road(3, &there)], 1, &[(Flaw::Doubled, Remedy::LeftOut)]);
         assert_eq!(rounded.ways[0].id.number, 3);
+    }
+
+    #[test]
+    fn two_carriageways_that_close_at_a_junction_keep_it() {
+        let divided = road(1, &[(1.0, 1.0), (5.0, 5.0), (1.02, 1.0)]);
+        let check = |other: Source, flaws: &[(Flaw, Remedy)], keeps: bool| {
+            let rounded = check(vec![divided.clone(), other], 2, flaws);
+            let tip = site().lattice.place_of([5.0, 5.0]).unwrap();
+            assert_eq!(rounded.ways.iter().filter(|way| way.places.contains(&tip)).count() == 2, keeps);
+        };
+        check(road(2, &[(5.0, 5.0), (9.0, 9.0)]), &[], true);
+        // What only flows there is no junction, and neither is a way that ends elsewhere.
+        check(
+            source(2, ("waterway", "stream"), &[(5.0, 5.0), (9.0, 9.0)]),
+            &[(Flaw::Spike, Remedy::PointLeftOut)],
+            false,
+        );
+        check(road(2, &[(6.0, 5.0), (9.0, 9.0)]), &[(Flaw::Spike, Remedy::PointLeftOut)], false);
     }
 
     #[test]
