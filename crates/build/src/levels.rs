@@ -38,13 +38,10 @@ pub(crate) fn all_levels(
     let ground = LevelGround { dem, mask };
     levels.resize_with(lod.level_count(), Vec::new);
     for place in 0..levels[0].len() {
-        let mut of_levels = Vec::new();
-        if !features.kept.is_empty() {
-            of_levels = kept.iter().map(|kept| kept.of(&levels[0][place])).collect::<Vec<_>>();
-            // Where none leaves out anything, all keep the same.
-            let last = of_levels[of_levels.len() - 1].clone();
-            of_levels.resize(lod.inner_shares.len(), last);
-        }
+        let mut of_levels: Vec<_> = kept.iter().map(|kept| kept.of(&levels[0][place])).collect();
+        // Where none leaves out anything, all keep the same.
+        let last = of_levels[of_levels.len() - 1].clone();
+        of_levels.resize(lod.inner_shares.len(), last);
         let wanted = Levels {
             inner_shares: &lod.inner_shares,
             border: lod.border,
