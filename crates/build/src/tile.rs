@@ -58,11 +58,12 @@ pub fn rebuild_tile(
     let mut run = open(job, folder, options, progress)?;
     let mut frozen = refuse_unfinished(&run, folder, tile)?;
     let is_outdated = is_outdated(&run);
+    let mut tins = published_tins(&run)?;
+    // What is decided of features and objects is published as it is found.
+    run.database.begin(&beginning(&run))?;
     decide_features(&mut run, progress)?;
     decide_objects(&mut run, progress)?;
     let shares = published_shares(&run, progress)?;
-    let mut tins = published_tins(&run)?;
-    run.database.begin(&beginning(&run))?;
 
     progress.tell(Event::Enter(Stage::Refine, 0));
     let others = with_other_features(&run, &shares, &tins, tile)?;
