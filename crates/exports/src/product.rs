@@ -7,7 +7,7 @@ use std::sync::Arc;
 use store::{Folder, Manifest, TileModules};
 use terrain::{
     GridFrame, HOLE_CLASS, LineForm, LineKind, LoadModule, MaterialName, ModuleGrid, ModuleId, ModuleLine, ModuleRect,
-    OBJECT_MATERIALS, QUANTA_PER_METRE, TileId,
+    OBJECT_MATERIALS, QUANTA_PER_METRE, TileId, plans,
 };
 
 use crate::classes::{Classes, names_in, water_in};
@@ -65,6 +65,8 @@ pub struct Product {
     pub(crate) tiles: Vec<TileModules>,
     /// Place in `tiles` of each module's tile.
     pub(crate) tile_of: Vec<u32>,
+    /// Objects of the database that are left out, since they stand over holes.
+    pub over_holes: usize,
 }
 
 impl Product {
@@ -123,7 +125,7 @@ impl Product {
         let (grid, frame) = (first.grid, first.frame);
         let coarser = levels.collect();
         let (lines, has_ribbons, materials, textures) = (Vec::new(), true, Vec::new(), None);
-        Ok(Self {
+        let mut product = Self {
             manifest,
             class_names,
             water,
@@ -139,7 +141,14 @@ impl Product {
             textures,
             tiles,
             tile_of,
-        })
+            over_holes: 0,
+        };
+        if 0 < product.hole_triangles() {
+            let count = product.object_count();
+            product.modules.iter_mut().chain(product.coarser.iter_mut().flatten()).for_each(leave_out_over_holes);
+            product.over_holes = count - product.object_count();
+        }
+        Ok(product)
     }
 
     /// The same at each of its levels, from fine to coarse, one at a time.
@@ -192,7 +201,7 @@ impl Product {
         if self.has_ribbons { length_m(&self.lines) } else { 0.0 }
     }
 
-    /// How many objects stand on what is exported.
+    /// How many objects stand on what is exported, those over holes left out.
     pub fn object_count(&self) -> usize {
         let objects = || self.modules.iter().map(|module| &module.objects);
         let prisms = objects().flat_map(|objects| objects.prisms.iter().map(|prism| (prism.kind, prism.id)));
@@ -344,4 +353,51 @@ fn length_m(lines: &[Vec<ModuleLine>]) -> f64 {
         east.hypot(north)
     };
     all.map(part).sum::<f64>() / f64::from(QUANTA_PER_METRE)
+}
+
+/// Leaves out buildings and parts of woods all of which stand over holes, where nothing is known of the ground.
+fn leave_out_over_holes(module: &mut LoadModule) {
+    let LoadModule { vertices, triangles, classes, objects, .. } = module;
+    let corner = |v: u16| [vertices[usize::from(v)].x, vertices[usize::from(v)].y].map(i64::from);
+    let over = triangles.iter().zip(classes.iter()).filter(|(_, class)| **class == HOLE_CLASS);
+    let holes: Vec<[[i64; 2]; 3]> = over.map(|(triangle, _)| triangle.map(corner)).collect();
+    // The middle of a triangle, in thirds of a quantum.
+    let stands_over = |triangle: [[i64; 2]; 3]| {
+        let middle = [0, 1].map(|axis| triangle.iter().map(|at| at[axis]).sum::<i64>());
+        let is_left = |a: [i64; 2], b: [i64; 2]| {
+            0 <= (b[0] - a[0]) * (middle[1] - 3 * a[1]) - (b[1] - a[1]) * (middle[0] - 3 * a[0])
+        };
+        holes.iter().any(|&[a, b, c]| is_left(a, b) && is_left(b, c) && is_left(c, a))
+    };
+    objects.prisms.retain(|prism| {
+        let (places, triangles) = plans::triangles(&prism.plan());
+        let at = |index: u32| places[index as usize].map(i64::from);
+        triangles.is_empty() || !triangles.iter().all(|triangle| stands_over(triangle.map(at)))
+    });
+    for canopy in &mut objects.canopies {
+        let at = |index: u16| canopy.places[usize::from(index)].map(i64::from);
+        canopy.triangles.retain(|triangle| !stands_over(triangle.map(at)));
+    }
+    objects.canopies.retain(|canopy| !canopy.triangles.is_empty());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples;
+
+    #[test]
+    fn what_stands_over_a_hole_is_left_out() {
+        let stand = |classes: &dyn Fn(&mut LoadModule)| {
+            let mut module = samples::with_objects().modules.swap_remove(1);
+            classes(&mut module);
+            leave_out_over_holes(&mut module);
+            let corners = module.objects.canopies.iter().map(|canopy| canopy.triangles.len()).sum::<usize>();
+            (module.objects.prisms.len(), corners)
+        };
+        assert_eq!(stand(&|_| ()), (1, 2));
+        assert_eq!(stand(&|module| module.classes.fill(HOLE_CLASS)), (0, 0));
+        // The house stands in the west, most of the wood in the north.
+        assert_eq!(stand(&|module| module.classes = samples::with_hole().modules[1].classes.clone()).0, 1);
+    }
 }

@@ -69,6 +69,7 @@ pub(crate) fn product() -> Product {
         textures: None,
         tiles: vec![tile_modules],
         tile_of: vec![0, 0],
+        over_holes: 0,
     }
 }
 

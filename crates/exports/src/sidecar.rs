@@ -87,6 +87,9 @@ pub fn sidecar(product: &Product, mesh: &Mesh, facts: &Facts) -> String {
         "hole_triangles_left_out": product.hole_triangles(),
         "attribution": product.attributions(),
     });
+    if 0 < product.over_holes {
+        value["objects_over_holes_left_out"] = json!(product.over_holes);
+    }
     if 0 < product.deck_triangles() {
         value["deck_triangles"] = json!(product.deck_triangles());
     }

@@ -390,6 +390,13 @@ fn summary(format: Format, product: &Product, said: Option<Datum>) -> String {
         1 => format!("1 triangle over a hole is {}\n", carries.holes),
         count => format!("{} triangles over holes are {}\n", grouped(count as u64), carries.holes),
     };
+    let over_holes = match product.over_holes {
+        0 => String::new(),
+        1 => "1 object over a hole is left out: nothing is known of its ground\n".into(),
+        count => {
+            format!("{} objects over holes are left out: nothing is known of their ground\n", grouped(count as u64))
+        }
+    };
     let decks = match product.deck_triangles() {
         0 => String::new(),
         count => format!("{} triangles of decks are {}\n", grouped(count as u64), carries.decks),
@@ -406,7 +413,10 @@ fn summary(format: Format, product: &Product, said: Option<Datum>) -> String {
     let texels = coarser.map_or_else(String::new, |[wanted_m, found_m]| {
         format!("texels have up to {found_m:.2} m, not {wanted_m:.2} m: textures hold no more, see --texture-max\n")
     });
-    format!("{said}{holes}{decks}{ribbons}{objects}{texels}{modules}, {} triangles{level}", grouped(triangles as u64))
+    format!(
+        "{said}{holes}{over_holes}{decks}{ribbons}{objects}{texels}{modules}, {} triangles{level}",
+        grouped(triangles as u64)
+    )
 }
 
 /// Writes what is one file for globes; what was done to heights.
