@@ -23,7 +23,7 @@ use tokio::task::spawn_blocking;
 use super::body::{Bodies, Received};
 use super::contents::TileModulesFile;
 use super::files::{self, Part};
-use super::globe::Kind;
+use super::globe::{HOLES, Kind};
 use super::looks::{ObstacleAsked, ProfileAsked, ViewshedAsked};
 use super::queries::{Heights, HeightsAsked, Lines, Looking};
 use super::refusal::Refusal;
@@ -180,7 +180,7 @@ pub async fn layer(State(shared): Context, UrlPath(name): UrlPath<String>, heade
 }
 
 pub async fn holes(State(shared): Context, UrlPath(name): UrlPath<String>, headers: HeaderMap) -> Answer {
-    globe_file(&shared, &headers, &name, Kind::Terrain, "holes.geojson".into()).await
+    globe_file(&shared, &headers, &name, Kind::Terrain, HOLES.into()).await
 }
 
 pub async fn terrain_tile(

@@ -22,6 +22,9 @@ const TRIANGLES_MAX: u64 = 8_000_000;
 /// Bytes of files that are kept, of a database.
 const KEPT_BYTES_MAX: usize = 64 << 20;
 
+/// The file of the terrain that says where holes are.
+pub const HOLES: &str = "holes.geojson";
+
 /// What the files are of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -66,7 +69,12 @@ impl Globes {
             return Ok(bytes.clone());
         }
         let made = match kind {
-            Kind::Terrain => self.terrain.get_or_init(|| self.terrain(of)).as_ref().map_err(Refusal::clone)?.file(name),
+            Kind::Terrain => match self.terrain.get_or_init(|| self.terrain(of, self.assumed)) {
+                Ok(terrain) => terrain.file(name),
+                // Where holes lie does not ask for heights.
+                Err(_) if name == HOLES => self.terrain(of, Some(Datum::Ellipsoid))?.file(name),
+                Err(refusal) => return Err(refusal.clone()),
+            },
             Kind::Tileset => {
                 let tileset = self.tileset.get_or_init(|| self.tileset(of)).as_ref().map_err(Refusal::clone)?;
                 tileset.file(name).map_err(refusal)?
@@ -83,10 +91,10 @@ impl Globes {
         Ok(bytes)
     }
 
-    fn terrain(&self, of: &Contents) -> Result<QuantizedMesh<Product>, Refusal> {
+    fn terrain(&self, of: &Contents, datum: Option<Datum>) -> Result<QuantizedMesh<Product>, Refusal> {
         worked(of, |work| {
             let product = Product::read(&of.folder, None, Levels::One(0), work)?;
-            QuantizedMesh::of(product, self.assumed, work)
+            QuantizedMesh::of(product, datum, work)
         })
     }
 
