@@ -84,10 +84,12 @@ impl Area {
 
     /// The first key in which `self` differs from `other`, with both values.
     pub fn difference(&self, other: &Area) -> Option<(&'static str, String, String)> {
+        let datum =
+            |area: &Area| if area.vertical_datum.is_empty() { "none".into() } else { area.vertical_datum.clone() };
         let pairs = [
             ("name", self.name.clone(), other.name.clone()),
             ("crs", self.crs.clone(), other.crs.clone()),
-            ("vertical_datum", self.vertical_datum.clone(), other.vertical_datum.clone()),
+            ("vertical_datum", datum(self), datum(other)),
             ("origin_m", format!("{:?}", self.origin_m), format!("{:?}", other.origin_m)),
             ("size_m", format!("{:?}", self.size_m), format!("{:?}", other.size_m)),
             ("spacing_m", self.spacing_m.to_string(), other.spacing_m.to_string()),
