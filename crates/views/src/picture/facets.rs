@@ -1,10 +1,12 @@
 //! Triangles to be drawn: of a TIN or of load modules, in metres from the area's south-west post.
 
 use terrain::Role;
-use terrain::{Dem, HOLE_CLASS, LoadModule, ModuleGrid, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta};
+use terrain::{
+    Dem, HOLE_CLASS, LoadModule, ModuleGrid, ObjectKind, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
+};
 
 use super::map_extent::slope;
-use super::objects::{Solid, solids};
+use super::objects::{Solid, kinds, solids};
 use super::scene::{Scene, SceneFeatures};
 
 /// Triangles with the places of their corners: east, north and up, in metres.
@@ -27,6 +29,8 @@ pub struct Facets {
     pub(crate) lines: Vec<([[f64; 3]; 2], u8)>,
     /// What stands on the ground.
     pub(crate) objects: Vec<Solid>,
+    /// Kinds of these.
+    pub(crate) kinds: Vec<ObjectKind>,
 }
 
 /// What a triangle or a post lies over.
@@ -60,6 +64,7 @@ impl Facets {
             decks: Vec::new(),
             lines: Vec::new(),
             objects: Vec::new(),
+            kinds: Vec::new(),
         }
     }
 
@@ -87,12 +92,13 @@ impl Facets {
     pub(crate) fn with_covers_of<'a>(
         self,
         scene: &Scene,
-        modules: impl IntoIterator<Item = &'a LoadModule> + Clone,
+        modules: impl IntoIterator<Item = &'a LoadModule, IntoIter: Clone> + Clone,
     ) -> Self {
         let mut facets = self.with_covers(modules.clone(), scene.water);
         let corner =
             |module: &LoadModule| [module.id.col, module.id.row].map(|index| f64::from(index) * scene.side_m());
         facets.objects = modules.clone().into_iter().flat_map(|module| solids(module, corner(module))).collect();
+        facets.kinds = kinds(modules.clone().into_iter());
         if let Some(features) = scene.features {
             let decks = modules.clone().into_iter().filter(|module| !module.decks.is_empty());
             facets.decks = decks.flat_map(|module| decks_of(module, scene, &features)).collect();

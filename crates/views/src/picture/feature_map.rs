@@ -4,7 +4,7 @@ use super::color::{BOUND, BREACH, Color, GREY, WHITE, mix};
 use super::facets::Facets;
 use super::features::{draw_left_out, draw_lines, keys, pixel, shows};
 use super::image::Image;
-use super::objects::{draw_plans, object_keys};
+use super::objects::{draw_plans, kinds, object_keys};
 use super::relief::{Tints, facets_relief};
 use super::scene::Scene;
 use super::sheet::{Drawing, Key, Legend, Sheet};
@@ -47,7 +47,7 @@ pub(crate) fn feature_map(scene: &Scene, longest: usize) -> Drawing {
     draw_lines(&mut map, &map_extent, scene, 1.4);
     let marks = OUTCOMES.iter().zip(counts).rev();
     let marks = marks.map(|((word, color), count)| (Key::Filled(*color), format!("{word}: {}", grouped(count))));
-    let on_map = [keys(|cover| shows(scene, &facets, cover)), object_keys(scene)].concat();
+    let on_map = [keys(|cover| shows(scene, &facets, cover)), object_keys(&kinds(scene.modules.iter()))].concat();
     let legends = vec![
         Legend::Keys { title: "What is there".into(), keys: on_map },
         Legend::Keys { title: "What became of them".into(), keys: marks.collect() },

@@ -125,17 +125,20 @@ pub(crate) fn draw_plans(image: &mut Image, map_extent: &MapExtent, scene: &Scen
     }
 }
 
-/// The colours of kinds that stand on the load modules of a scene.
-pub(crate) fn object_keys(scene: &Scene) -> Vec<(Key, String)> {
-    let objects = || scene.modules.iter().map(|module| &module.objects);
-    let has = |kind: &ObjectKind| {
-        objects().any(|all| {
+/// The kinds that stand on load modules.
+pub(crate) fn kinds<'a>(modules: impl Iterator<Item = &'a LoadModule> + Clone) -> Vec<ObjectKind> {
+    let stands = |kind: &ObjectKind| {
+        modules.clone().map(|module| &module.objects).any(|all| {
             all.prisms.iter().any(|prism| prism.kind == *kind) || all.canopies.iter().any(|wood| wood.kind == *kind)
         })
     };
+    ObjectKind::ALL.into_iter().filter(stands).collect()
+}
+
+/// The colours of kinds.
+pub(crate) fn object_keys(kinds: &[ObjectKind]) -> Vec<(Key, String)> {
     let color = |kind: ObjectKind| if kind == ObjectKind::Building { ROOF } else { color_of(kind) };
-    let there = ObjectKind::ALL.into_iter().filter(has);
-    there.map(|kind| (Key::Filled(color(kind)), kind.name().to_owned())).collect()
+    kinds.iter().map(|&kind| (Key::Filled(color(kind)), kind.name().to_owned())).collect()
 }
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
 //! Pictures of several surfaces from one eye, side by side under one title.
 
+use terrain::ObjectKind;
+
 use super::camera::Camera;
 use super::color::{GREY, INK, NOTHING, WHITE};
 use super::image::Image;
+use super::objects::object_keys;
 use super::perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 use super::relief::Tints;
-use super::sheet::{Key, draw_scale};
+use super::sheet::{Key, Legend, draw_scale};
 use super::text::{Anchor, Font, fitted, wrapped, write};
 
 /// How surfaces are drawn.
@@ -51,8 +54,16 @@ pub fn draw_panels(title: &str, eye: &str, panels: &[Panel], style: Style, look:
     let top = GAP + Font::Title.line() + GAP / 2 + Font::Bold.line();
     let notes = wrapped(&notes(eye, look), Font::Plain, whole - 2 * GAP);
     let has = |cover| panels.iter().any(|panel| panel.surface.has(cover));
+    let mut kinds: Vec<ObjectKind> = panels.iter().flat_map(|panel| panel.surface.kinds()).copied().collect();
+    kinds.sort_unstable();
+    kinds.dedup();
     let tints = match style {
-        Style::Shaded => Tints::new(look.range_m).legends(has, Key::Filled(NOTHING)),
+        Style::Shaded => {
+            let objects = Legend::Keys { title: "What stands there".into(), keys: object_keys(&kinds) };
+            let mut tints = Tints::new(look.range_m).legends(has, Key::Filled(NOTHING));
+            tints.extend((!kinds.is_empty()).then_some(objects));
+            tints
+        }
         Style::Wireframe => Default::default(),
     };
     let body = high.max(ABOVE_TINTS + tints.iter().map(|legend| legend.high() + GAP).sum::<i64>()) + GAP;

@@ -3,7 +3,7 @@
 //! All of them are drawn by the same light, the same tints and the same haze, so that two pictures from one eye differ
 //! by their surfaces alone.
 
-use terrain::{Dem, metres_of_quanta};
+use terrain::{Dem, ObjectKind, metres_of_quanta};
 
 use super::camera::{Camera, View};
 use super::color::{Color, FEATURES, GREY, HAZE, INK, NOTHING, SKY, WATER, WHITE, lit, mix};
@@ -79,6 +79,14 @@ impl Surface<'_> {
         match self {
             Surface::Triangles(facets) => facets.shows(cover),
             Surface::Posts(.., covers) => covers.contains(&cover),
+        }
+    }
+
+    /// Kinds of what stands on it.
+    pub(crate) fn kinds(&self) -> &[ObjectKind] {
+        match self {
+            Surface::Triangles(facets) => &facets.kinds,
+            Surface::Posts(..) => &[],
         }
     }
 
