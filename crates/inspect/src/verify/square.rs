@@ -43,6 +43,12 @@ impl<'a> Square<'a> {
         })
     }
 
+    /// Whether a place lies on one of its sides.
+    pub fn is_side(&self, (y, x): At) -> bool {
+        let [south, west, north, east] = self.reach();
+        y == south || y == north || x == west || x == east
+    }
+
     /// Whether a place lies in it or on its sides.
     pub fn holds(&self, (y, x): At) -> bool {
         let (side, (south, west)) = (i64::from(self.module.side), self.south_west);

@@ -89,8 +89,10 @@ impl Ways {
         for (index, &place) in places.iter().enumerate() {
             let meeting = self.meetings.entry((family, place)).or_default();
             let is_end = index == 0 || index == last;
-            // What passes on a bridge or in a tunnel does not meet what ends below or above it.
-            meeting.goes_on |= !traits.is_kept && (is_end || traits.storey == LineStorey::Ground);
+            // What passes on a bridge or in a tunnel does not meet what ends below or above it, also where it is cut
+            // between two load modules.
+            let is_cut = || ground.square.is_side(place);
+            meeting.goes_on |= !traits.is_kept && (traits.storey == LineStorey::Ground || is_end && !is_cut());
             meeting.is_passed |= traits.is_kept && !is_end;
             if traits.is_kept && is_end {
                 meeting.kept_ends = meeting.kept_ends.saturating_add(1);
