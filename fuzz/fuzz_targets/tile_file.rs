@@ -10,7 +10,7 @@ use store::{
 };
 use libfuzzer_sys::fuzz_target;
 
-/// The frame as `database/src/frame.rs` draws it.
+/// The frame as `store/src/frame.rs` draws it.
 fn framed(kind: &[u8; 3], payload: &[u8]) -> Vec<u8> {
     let mut file = [&b"\x89"[..], kind, b"\r\n\x1a\n"].concat();
     file.extend(1u32.to_le_bytes());

@@ -63,7 +63,7 @@ fn results_change_only_with_the_algorithm_revision() {
     let is_raised = kept.lines().next() != found.lines().next();
     assert!(
         is_raised,
-        "the same jobs give other bytes than before, and ALGORITHM_REVISION in compiler/src/run.rs is still \
+        "the same jobs give other bytes than before, and ALGORITHM_REVISION in build/src/run.rs is still \
          {ALGORITHM_REVISION}: raise it, so that what is published is built again, then run this test with \
          UPDATE_GOLDEN=1\nbefore:\n{kept}\nnow:\n{found}"
     );
