@@ -390,25 +390,17 @@ fn summary(format: Format, product: &Product, said: Option<Datum>) -> String {
         1 => format!("1 triangle over a hole is {}\n", carries.holes),
         count => format!("{} triangles over holes are {}\n", grouped(count as u64), carries.holes),
     };
-    let over_holes = match product.over_holes {
+    let counted = |count: usize, what: &str, become_of: &str| match count {
         0 => String::new(),
-        1 => "1 object over a hole is left out: nothing is known of its ground\n".into(),
-        count => {
-            format!("{} objects over holes are left out: nothing is known of their ground\n", grouped(count as u64))
-        }
+        count => format!("{} {what} are {become_of}\n", grouped(count as u64)),
     };
-    let decks = match product.deck_triangles() {
-        0 => String::new(),
-        count => format!("{} triangles of decks are {}\n", grouped(count as u64), carries.decks),
-    };
+    let over_holes = counted(product.over_holes, "objects over holes", "left out: nothing is known of their ground");
+    let decks = counted(product.deck_triangles(), "triangles of decks", carries.decks);
     let ribbons = match product.ribbons_m() / 1000.0 {
         0.0 => String::new(),
         km => format!("ribbons of {km:.1} km are {}\n", carries.ribbons),
     };
-    let objects = match product.object_count() {
-        0 => String::new(),
-        count => format!("{} objects are {}\n", grouped(count as u64), carries.objects),
-    };
+    let objects = counted(product.object_count(), "objects", carries.objects);
     let coarser = product.textures.as_ref().and_then(|textures| textures.coarser_m());
     let texels = coarser.map_or_else(String::new, |[wanted_m, found_m]| {
         format!("texels have up to {found_m:.2} m, not {wanted_m:.2} m: textures hold no more, see --texture-max\n")
