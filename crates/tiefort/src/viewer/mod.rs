@@ -116,13 +116,13 @@ async fn standing(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u3
 }
 
 async fn ground(State(viewed): State<Arc<Viewed>>) -> impl IntoResponse {
-    let why = tokio::task::spawn_blocking(move || ground(&viewed).err()).await;
+    let why = tokio::task::spawn_blocking(move || ground_of(&viewed).err()).await;
     let why = why.unwrap_or_else(|_| Some(FAULT.into()));
     ([(header::CONTENT_TYPE, "application/json")], serde_json::json!({ "why": why }).to_string())
 }
 
 async fn dem(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
-    answer(sides, viewed, bytes).await
+    answer(sides, viewed, post_bytes).await
 }
 
 /// What `read` says of a block, read where it may wait for the disk.
@@ -201,7 +201,7 @@ fn write_vertices(vertices: &[Vertex], out: &mut Vec<u8>) {
     }
 }
 
-/// Posts of an area up to which the ground_of is held: 12 post_bytes each.
+/// Posts of an area up to which the ground is held: 12 bytes each.
 const POSTS_MAX: usize = 32 << 20;
 
 /// The DEM's posts under `block`, where the sources of the database can be read.
@@ -210,26 +210,26 @@ const POSTS_MAX: usize = 32 << 20;
 /// south-west; then the residual of each, DEM less triangles (f32; not a number at voids).
 ///
 /// # Errors
-/// In words, when there is no ground_of to show.
+/// In words, when there is no ground to show.
 fn post_bytes(viewed: &Viewed, block: Block) -> Result<Vec<u8>, String> {
-    let ground_of = ground_of(viewed)?;
+    let ground = ground_of(viewed)?;
     let Block { south, west, north, east } = block;
     let rect = viewed.grid.posts_of_rect(ModuleRect { south, west, north, east });
-    let whole = ground_of.dem.rect();
+    let whole = ground.dem.rect();
     let metres = |quanta: i32| quanta as f32 / QUANTA_PER_METRE as f32;
     let posts = (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| Post::new(row, col)));
     let residual = |post: Post| {
         let place = whole.index(post);
-        match ground_of.residuals[place] {
+        match ground.residuals[place] {
             NO_RESIDUAL => f32::NAN,
             quanta => metres(quanta),
         }
     };
-    let heights = posts.clone().map(|post| metres(ground_of.dem.height(post)));
+    let heights = posts.clone().map(|post| metres(ground.dem.height(post)));
     Ok(heights.chain(posts.map(residual)).flat_map(f32::to_le_bytes).collect())
 }
 
-/// The ground_of of the whole area, read when it is first asked for.
+/// The ground of the whole area, read when it is first asked for.
 ///
 /// # Errors
 /// In words, when the sources cannot be read, or too large.
@@ -242,9 +242,9 @@ fn read(viewed: &Viewed) -> Result<ProductGround, String> {
     if POSTS_MAX < posts {
         return Err(format!("the area has {posts} posts, and the viewer holds at most {POSTS_MAX}"));
     }
-    let wanted = Wanted { part: None, ground_of: WantedGround::Recorded, workers: 2 };
+    let wanted = Wanted { part: None, ground: WantedGround::Recorded, workers: 2 };
     let product = Product::read(&viewed.folder, &wanted).map_err(|error| error.to_string())?;
-    product.ground.ok_or_else(|| "the database names no ground_of".into())
+    product.ground.ok_or_else(|| "the database names no ground".into())
 }
 
 #[cfg(test)]
