@@ -38,6 +38,8 @@ pub enum Kind {
 pub struct Globes {
     assumed: Option<Datum>,
     terrain: OnceLock<Result<QuantizedMesh<Product>, Refusal>>,
+    /// Where holes lie, of a database whose heights cannot be brought above the ellipsoid.
+    holes: OnceLock<Result<Option<Bytes>, Refusal>>,
     tileset: OnceLock<Result<Tileset, Refusal>>,
     kept: Mutex<Kept>,
 }
@@ -51,7 +53,7 @@ struct Kept {
 impl Globes {
     pub fn new(assumed: Option<Datum>) -> Self {
         let kept = Mutex::new(Kept { files: LruCache::unbounded(), bytes: 0 });
-        Self { assumed, terrain: OnceLock::new(), tileset: OnceLock::new(), kept }
+        Self { assumed, terrain: OnceLock::new(), holes: OnceLock::new(), tileset: OnceLock::new(), kept }
     }
 
     /// What decides the bytes of files beside the database.
@@ -70,23 +72,26 @@ impl Globes {
         }
         let made = match kind {
             Kind::Terrain => match self.terrain.get_or_init(|| self.terrain(of, self.assumed)) {
-                Ok(terrain) => terrain.file(name),
+                Ok(terrain) => terrain.file(name).map(Bytes::from),
                 // Where holes lie does not ask for heights.
-                Err(_) if name == HOLES => self.terrain(of, Some(Datum::Ellipsoid))?.file(name),
+                Err(_) if name == HOLES => self
+                    .holes
+                    .get_or_init(|| Ok(self.terrain(of, Some(Datum::Ellipsoid))?.file(name).map(Bytes::from)))
+                    .clone()?,
                 Err(refusal) => return Err(refusal.clone()),
             },
             Kind::Tileset => {
                 let tileset = self.tileset.get_or_init(|| self.tileset(of)).as_ref().map_err(Refusal::clone)?;
-                tileset.file(name).map_err(refusal)?
+                tileset.file(name).map_err(refusal)?.map(Bytes::from)
             }
         };
         let listed = match kind {
             Kind::Terrain => "layer.json",
             Kind::Tileset => "tileset.json",
         };
-        let bytes = Bytes::from(made.ok_or_else(|| {
+        let bytes = made.ok_or_else(|| {
             Refusal::missing(format!("found no {name}, expected one that {listed} lists"), "read that file first")
-        })?);
+        })?;
         lock().keep(name, &bytes);
         Ok(bytes)
     }
