@@ -182,12 +182,17 @@ impl Raster {
         }
     }
 
-    /// Its heights in quanta; voids stay void.
+    /// Its heights in quanta; voids stay void, with the heights that [`Raster::settle_voids`] gave them.
     pub fn dem(&self) -> Dem {
-        if 0 < self.voids.count {
-            return Dem::from_fn(self.window, |post| self.height_m(post).and_then(quanta_of_metres));
-        }
         let (scale, wide) = (self.scale, self.window.posts_wide());
+        if 0 < self.voids.count {
+            let mut dem = Dem::from_fn(self.window, |post| self.height_m(post).and_then(quanta_of_metres));
+            if self.voids.settled {
+                let height = |post| quanta_of_metres(scale.height_m(self.samples.get(self.window.index(post))));
+                dem.fill_voids(|post| height(post).unwrap_or(0));
+            }
+            return dem;
+        }
         // The type of samples is asked for once a row, and not once a post.
         Dem::from_row_fn(self.window, |row, heights| {
             let at = (row - self.window.south) as usize * wide;

@@ -1,7 +1,7 @@
 //! Ground that is flat, has holes, is excluded, or has fewer posts than points are asked for.
 
 use build::workbench::{TinMethod, TinRequest};
-use job::{ErrorKey, Optimising};
+use job::{Effort, ErrorKey, Optimising};
 use terrain::{Dem, Post, PostRect, StopReason, TinFault};
 
 use crate::modes::write_polygon;
@@ -263,6 +263,43 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
         let [rms_m, left_m] = [mesh.residual.rms_m, sums.rms_m()];
         assert!((rms_m - left_m).abs() < 0.05 * rms_m, "{rms_m} {left_m}");
         assert!(sums.max_m() <= mesh.residual.max_m + 1e-9);
+    }
+}
+
+#[test]
+fn beside_voids_no_vertex_of_a_mesh_stands_outside_the_ground() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("dem.tif");
+    let height = |post: Post| {
+        let [row, col] = [post.row, post.col].map(f64::from);
+        (128.0 * (1000.0 + 80.0 * (row / 10.0).sin() * (col / 15.0).cos())) as i32
+    };
+    let rect = PostRect::of_size(101, 121);
+    let is_void = |post: Post| (51..81).contains(&post.row) && (30..70).contains(&post.col);
+    for effort in [Effort::Fast, Effort::Normal, Effort::Best] {
+        let residual_of = |dem: &Dem| {
+            write_dem(&path, dem);
+            let request = TinRequest {
+                dem: path.clone(),
+                crs: None,
+                method: TinMethod::Optimised(Optimising { effort, ..Optimising::default() }),
+                points: None,
+                triangles: Some(500),
+                max_residual_m: None,
+                rms_m: None,
+                start: None,
+                tiles: None,
+                workers: 2,
+            };
+            let mesh = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap();
+            let heights = mesh.tin.vertices.iter().map(|vertex| f64::from(vertex.height) / 128.0);
+            assert!(heights.fold(true, |all, height| all && (904.0..=1096.0).contains(&height)), "{effort:?}");
+            mesh.residual
+        };
+        let whole = residual_of(&Dem::from_fn(rect, |post| Some(height(post))));
+        let holed = residual_of(&Dem::from_fn(rect, |post| (!is_void(post)).then(|| height(post))));
+        let is_as_true = holed.rms_m < 1.5 * whole.rms_m && holed.max_m < 5.0 * whole.max_m;
+        assert!(is_as_true, "{effort:?}: {holed:?} {whole:?}");
     }
 }
 
