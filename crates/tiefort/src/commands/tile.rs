@@ -7,7 +7,7 @@ use job::Job;
 use terrain::TileId;
 
 use crate::arguments::{RunArguments, row_col};
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Cause, Failure, Outcome};
 use crate::run::{Finished, Run};
 
 const AFTER_HELP: &str = "\
@@ -43,13 +43,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     check_tile(&job, arguments.tile)?;
     let what = format!("re-running tile {},{} of", arguments.tile.row, arguments.tile.col);
     let run = Run::announce(&job, &arguments.run, &what)?;
-    run.finish(|listener| {
+    let ended = run.finish(|listener| {
         let (tile, release, options) = (arguments.tile, arguments.release_borders, run.options(false));
         let rebuilt = build::rebuild_tile(&job, run.folder(), tile, release, &options, listener)?;
         let names: Vec<String> = rebuilt.rebuilt.iter().map(TileId::to_string).collect();
         let frozen = if rebuilt.frozen { "; frozen: a build makes it whole" } else { "" };
         let tiles = format!("{} built{frozen}", names.join(", "));
         Ok(Finished { report: rebuilt.report, tiles, is_unchanged: false })
+    });
+    // Where what stands on the ground or clips edges is not whole, a tile by itself is refused.
+    ended.map_err(|failure| match failure.cause() {
+        Cause::Stopped => failure.with_hint("`tiefort build` goes on from here"),
+        _ => failure,
     })
 }
 
