@@ -402,6 +402,8 @@ impl Ground {
         let residual = PyDict::new(py);
         residual.set_item("posts", module.residual.posts)?;
         residual.set_item("rms_m", module.residual.rms_m())?;
+        let mean_abs = module.residual.sum_abs as f64 / f64::from(module.residual.posts);
+        residual.set_item("mean_abs_m", mean_abs / f64::from(QUANTA_PER_METRE))?;
         residual.set_item("max_m", f64::from(module.residual.largest) / f64::from(QUANTA_PER_METRE))?;
         let triangles = module.triangles.iter().map(|corners| corners.map(u32::from));
         let classes = PyArray1::from_slice(py, &module.classes);

@@ -2,13 +2,14 @@
 //!
 //! The work runs in a thread of its own, because only the thread that waits sees a signal. A run looks at its flag
 //! between tiles, and a tile may take minutes: so it gets a moment to end by itself, then it is left alone. After that
-//! it does what any run does that was asked to stop: it ends its tile and ends.
+//! it does what any run does that was asked to stop: it ends its tile and ends. What keeps a folder from others until
+//! then is waited for before other work begins.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread::Builder;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{Builder, JoinHandle, sleep};
 use std::time::Duration;
 
 use build::{Event, Progress};
@@ -21,6 +22,9 @@ use crate::raised::{named, raised};
 const LOOK: Duration = Duration::from_millis(20);
 /// What a run has to end by itself.
 const GRACE: Duration = Duration::from_millis(400);
+
+/// Work that was left alone and keeps a folder from others until it has ended.
+static LEFT_ALONE: Mutex<Vec<JoinHandle<()>>> = Mutex::new(Vec::new());
 
 /// What the work tells.
 enum News<T> {
@@ -43,7 +47,7 @@ impl<T: Send> Progress for Told<T> {
 pub enum Raising {
     /// It is left alone after a moment: nothing depends on its end.
     LeavesIt,
-    /// It is waited for: until its end it keeps a folder from others.
+    /// It is waited for: until its end it keeps a folder from others. After a signal the next work waits for it.
     AwaitsIt,
 }
 
@@ -69,6 +73,7 @@ pub fn wait_for<T: Send + 'static>(
     raising: Raising,
     work: impl FnOnce(&AtomicBool, &mut dyn Progress) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<T> {
+    await_left_alone(py)?;
     let stop = Arc::new(AtomicBool::new(false));
     let (sender, mut receiver) = channel();
     let flag = Arc::clone(&stop);
@@ -77,10 +82,10 @@ pub fn wait_for<T: Send + 'static>(
         let ended = catch_unwind(AssertUnwindSafe(|| work(&flag, &mut progress)));
         let _ = sender.send(News::Ended(ended.unwrap_or_else(|_| Err(Failure::bug()))));
     };
-    if let Err(error) = Builder::new().name("tiefort".into()).spawn(run) {
+    let thread = Builder::new().name("tiefort".into()).spawn(run).map_err(|error| {
         let hint = "end other programs, or raise the limit of threads";
-        return Err(named(py, "RequestError", &format!("found no thread to work in: {error}, expected one"), hint));
-    }
+        named(py, "RequestError", &format!("found no thread to work in: {error}, expected one"), hint)
+    })?;
     // What the callback raised, while the end is waited for.
     let mut raised_before = None;
     loop {
@@ -104,9 +109,29 @@ pub fn wait_for<T: Send + 'static>(
         } else if let Err(error) = signal.and(heard) {
             stop.store(true, Ordering::Relaxed);
             py.detach(move || end(&receiver));
+            if raising == Raising::AwaitsIt {
+                LEFT_ALONE.lock().unwrap_or_else(PoisonError::into_inner).push(thread);
+            }
             return Err(error);
         }
     }
+}
+
+/// Waits for what was left alone.
+///
+/// # Errors
+/// What a signal raises.
+fn await_left_alone(py: Python<'_>) -> PyResult<()> {
+    let runs = || {
+        let mut left = LEFT_ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        left.retain(|thread| !thread.is_finished());
+        !left.is_empty()
+    };
+    while runs() {
+        py.detach(|| sleep(LOOK));
+        py.check_signals()?;
+    }
+    Ok(())
 }
 
 /// Waits a moment for work that was asked to stop.

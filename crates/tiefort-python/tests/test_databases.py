@@ -6,7 +6,10 @@ import filecmp
 import json
 import multiprocessing
 import os
+import pickle
 import shutil
+import subprocess
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -72,6 +75,26 @@ def test_a_callback_that_raises_ends_a_build_which_goes_on_later(tmp_path: Path)
         tiefort.open(tmp_path / "a.tdb")
     assert tiefort.build(JOB, tmp_path / "a.tdb").ok is not None
     assert tiefort.verify(tmp_path / "a.tdb").sound
+
+
+def test_after_ctrl_c_a_build_goes_on_at_once(tmp_path: Path) -> None:
+    program = f"""
+import os, signal, threading, tiefort
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sent = []
+def send(progress):
+    if progress.what == "started" and progress.stage == "refine" and not sent:
+        sent.append(threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)))
+        sent[0].start()
+job, out = {JOB!r}, {str(tmp_path / "a.tdb")!r}
+try:
+    tiefort.build(job, out, workers=1, html=False, progress=send)
+except KeyboardInterrupt:
+    print("interrupted")
+print(tiefort.build(job, out, workers=1, html=False).ok)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and done.stdout.startswith("interrupted"), done.stderr
 
 
 def test_two_builds_in_one_folder_and_the_second_is_told_to_wait(tmp_path: Path) -> None:
@@ -148,6 +171,9 @@ def test_a_job_of_any_text_is_read_as_it_was_given() -> None:
 
 
 def test_plan_tile_verify_and_explain(database: Path, tmp_path: Path) -> None:
+    for wrong in ("0,0", (0, 0, 0), 3):
+        with pytest.raises(tiefort.RequestError, match="expected its row and column"):
+            tiefort.tile(JOB, wrong, tmp_path / "none.tdb")  # type: ignore[arg-type]
     plan = tiefort.plan(JOB)
     assert len(plan["tiles"]) == 4 and 0 < plan["forecast"]["memory_bytes"]
     copy = tmp_path / "copy.tdb"
@@ -309,6 +335,16 @@ def test_places_seen_from_one_eye_are_those_of_single_lines(database: Path) -> N
         assert (seen == opened.line_of_sight(eye, targets, absolute=True).visible).all()
 
 
+def test_a_database_goes_to_another_process_and_answers_are_compared_as_what_they_are(database: Path) -> None:
+    with tiefort.open(database) as opened:
+        again = pickle.loads(pickle.dumps(opened))
+        middle = [(opened.bounds[0] + opened.bounds[2]) / 2, (opened.bounds[1] + opened.bounds[3]) / 2]
+        assert again.heights(middle) == opened.heights(middle)
+        eye = [*middle, 2.0]
+        first, second = opened.line_of_sight(eye, eye), again.line_of_sight(eye, eye)
+        assert first == first and first != second and len({first, second}) == 2
+
+
 def test_a_profile_is_the_heights_along_a_line(database: Path) -> None:
     with tiefort.open(database) as opened:
         through = [(506_000, 3_876_000), (507_000, 3_876_000), (507_000, 3_876_500)]
@@ -330,6 +366,7 @@ def test_a_profile_is_the_heights_along_a_line(database: Path) -> None:
 def test_a_load_module_is_a_mesh(database: Path, tmp_path: Path) -> None:
     with tiefort.open(database) as opened:
         mesh = opened.module(2, 3)
+        assert 0 < mesh.residual.mean_abs_m < mesh.residual.rms_m < mesh.residual.max_m
         inside = mesh.vertices[:, :2].mean(axis=0)
         assert mesh.sample(inside) == pytest.approx(opened.heights(inside), abs=1e-6)
         assert mesh.classes is not None and len(mesh.classes) == len(mesh.triangles)
@@ -404,6 +441,12 @@ def test_buildings_and_woods_hide_and_block(tmp_path: Path) -> None:
         stems = opened.obstacle_at([507_200, 3_876_700], 3)
         assert stems is not None and stems.kind == "wood" and stems.spacing_m == 4
         assert opened.obstacle_at([506_050, 3_876_110], 3) is None
+        with pytest.raises(tiefort.RequestError, match="expected a place in the area"):
+            opened.obstacle_at([0, 0], 3)
+        with pytest.raises(tiefort.RequestError, match="wheels_m: found nan"):
+            opened.obstacle_at([506_050, 3_876_110], 3, wheels_m=float("nan"))
+        masked = np.ma.masked_array([[506_050, 3_876_110]] * 2, mask=[[True, True], [False, False]])
+        assert np.isnan(opened.heights(masked)).tolist() == [True, False]
         with pytest.raises(tiefort.RequestError, match='objects: found "some"'):
             opened.visible(eye, behind, objects="some")
         seen = opened.viewshed((506_110, 3_876_160), 60, eye_m=2, spacing_m=5)

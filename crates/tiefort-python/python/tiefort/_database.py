@@ -8,7 +8,7 @@ import operator
 import os
 from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,7 @@ _AT_ONCE = 1 << 20
 _VIEWSHED_MAX = 1 << 28
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LineOfSight:
     """What stands between places.
 
@@ -80,7 +80,7 @@ class Obstacle:
     spacing_m: float | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Viewshed:
     """What is seen from one place.
 
@@ -106,7 +106,7 @@ class Viewshed:
         return _data_array(self.visible, self.transform, self.crs, "visible")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Profile:
     """The ground along a line.
 
@@ -185,6 +185,10 @@ class Database:
 
     def __enter__(self) -> Database:
         return self
+
+    def __reduce__(self) -> tuple[Callable[[Path], Database], tuple[Path]]:
+        # Another process opens it again.
+        return open, (self._path,)
 
     def __exit__(
         self,
@@ -293,9 +297,16 @@ class Database:
             raise RequestError(f"at: found {len(places)} places, expected one", "call obstacle_at once for each")
         if not (math.isfinite(radius_m) and 0 <= radius_m):
             raise RequestError(f"radius_m: found {radius_m}, expected 0 or a number above it", "in metres")
-        height_m = float(self._ground.heights(places)[0]) if wheels_m is None else float(wheels_m)
-        found = self._ground.obstacle((float(places[0, 0]), float(places[0, 1]), height_m), float(radius_m))
-        return None if found is None else Obstacle(*found)
+        ground_m = float(self._ground.heights(places)[0])
+        if math.isnan(ground_m):
+            raise RequestError(
+                f"at: found {places[0].tolist()}, expected a place in the area", "east and north in metres"
+            )
+        height_m = ground_m if wheels_m is None else float(wheels_m)
+        if not math.isfinite(height_m):
+            raise RequestError(f"wheels_m: found {height_m}, expected a height", "in metres above the vertical datum")
+        hit = self._ground.obstacle((float(places[0, 0]), float(places[0, 1]), height_m), float(radius_m))
+        return None if hit is None else Obstacle(*hit)
 
     def line_of_sight(
         self, a: npt.ArrayLike, b: npt.ArrayLike, *, absolute: bool = False, objects: str = "all"
@@ -467,7 +478,9 @@ class Database:
         """
         row, col, level = (_index(name, number) for name, number in (("row", row), ("col", col), ("level", level)))
         vertices, triangles, classes, figures = self._ground.module(row, col, level)
-        residual = Residual(figures["rms_m"] if figures["posts"] else math.nan, figures["max_m"])
+        known = figures["posts"] != 0
+        rms_m, mean_abs_m = (figures[name] if known else math.nan for name in ("rms_m", "mean_abs_m"))
+        residual = Residual(rms_m, figures["max_m"], mean_abs_m)
         exported = [self._path, f"--modules={row},{col}", f"--lod={level}"]
         return Mesh(vertices, triangles, residual, self.crs, exported=exported, classes=classes)
 
@@ -536,7 +549,9 @@ class Database:
         return geopandas.GeoDataFrame(columns, geometry=plans, crs=self.crs)
 
     def to_xarray(self, spacing_m: float | None = None) -> DataArray:
-        """Return heights of the whole area as an ``xarray.DataArray``, the northern row first.
+        """Return heights of the area as an ``xarray.DataArray``, the northern row first.
+
+        They begin at its south-western corner and end with the last whole step in it.
 
         Parameters
         ----------

@@ -224,7 +224,8 @@ def affine(transform: Any) -> Affine6:
 
 def places_of(xy: Any, count: int = 2, name: str = "xy") -> tuple[npt.NDArray[np.float64], tuple[int, ...]]:
     """Places as rows of numbers, and the shape of what is answered."""
-    array = np.asarray(xy)
+    # What is masked is no place, of which nothing is known.
+    array = np.ma.filled(xy.astype(np.float64), np.nan) if np.ma.isMaskedArray(xy) else np.asarray(xy)
     if array.dtype.kind not in "fiu" or array.ndim == 0 or array.shape[-1] != count:
         what = "east and north" if count == 2 else "east, north and height"
         message = f"{name}: found an array of {array.dtype} and shape {array.shape}, expected (…, {count}): {what}"

@@ -185,7 +185,10 @@ def tile(
     """
     read = _job_of(job)
     how = _how(workers, False, force, strict, html)
-    row, col = tile
+    try:
+        row, col = (operator.index(number) for number in tile)
+    except (TypeError, ValueError):
+        raise RequestError(f"tile: found {tile!r}, expected its row and column", "as (2, 3)") from None
     text, tiles = _tiefort.tile(read._job, (row, col), _folder(read, out), release_borders, how, Teller(progress))
     return Report(text, rebuilt=len(tiles))
 
