@@ -63,7 +63,6 @@ def sample(folder):
     size = sum(path.stat().st_size for path in (folder / "ntc.tdb").rglob("*") if path.is_file())
     modules = sum(path.stat().st_size for path in (folder / "ntc.tdb" / "modules").iterdir())
     module, window, features = report["per_load_module"], report["per_4km"], report["features"]
-    wall, cpu = (sum(stage[key] for stage in report["stages"]) for key in ("wall_s", "cpu_s"))
     rows = [
         ("triangles", f"{report['triangles']:,}"),
         ("largest load module", f"{module['max']} of {module['limit']}"),
@@ -77,8 +76,6 @@ def sample(folder):
         ("lakes", str(sum(row["lakes"] for row in features["classes"]))),
         ("load modules on the disk", f"{modules / 1e6:.1f} MB"),
         ("the whole database", f"{size / 1e6:.1f} MB"),
-        ("time on the clock, with workers", f"{wall:.1f} s, {report['workers']}"),
-        ("processor time", f"{cpu:.1f} s"),
     ]
     put(FIGURES, "sample", "| | |\n| - | -: |\n" + "".join(f"| {name} | {value} |\n" for name, value in rows))
 
