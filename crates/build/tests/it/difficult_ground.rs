@@ -292,8 +292,8 @@ fn beside_voids_no_vertex_of_a_mesh_stands_outside_the_ground() {
                 workers: 2,
             };
             let mesh = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap();
-            let heights = mesh.tin.vertices.iter().map(|vertex| f64::from(vertex.height) / 128.0);
-            assert!(heights.fold(true, |all, height| all && (904.0..=1096.0).contains(&height)), "{effort:?}");
+            let mut heights = mesh.tin.vertices.iter().map(|vertex| f64::from(vertex.height) / 128.0);
+            assert!(heights.all(|height| (904.0..=1096.0).contains(&height)), "{effort:?}");
             mesh.residual
         };
         let whole = residual_of(&Dem::from_fn(rect, |post| Some(height(post))));
