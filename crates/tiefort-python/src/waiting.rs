@@ -3,7 +3,7 @@
 //! The work runs in a thread of its own, because only the thread that waits sees a signal. A run looks at its flag
 //! between tiles, and a tile may take minutes: so it gets a moment to end by itself, then it is left alone. After that
 //! it does what any run does that was asked to stop: it ends its tile and ends. What keeps a folder from others until
-//! then is waited for before other work begins.
+//! then is waited for before other such work begins.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -47,7 +47,7 @@ impl<T: Send> Progress for Told<T> {
 pub enum Raising {
     /// It is left alone after a moment: nothing depends on its end.
     LeavesIt,
-    /// It is waited for: until its end it keeps a folder from others. After a signal the next work waits for it.
+    /// It is waited for: until its end it keeps a folder from others. After a signal the next such work waits for it.
     AwaitsIt,
 }
 
@@ -73,7 +73,9 @@ pub fn wait_for<T: Send + 'static>(
     raising: Raising,
     work: impl FnOnce(&AtomicBool, &mut dyn Progress) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<T> {
-    await_left_alone(py)?;
+    if raising == Raising::AwaitsIt {
+        await_left_alone(py)?;
+    }
     let stop = Arc::new(AtomicBool::new(false));
     let (sender, mut receiver) = channel();
     let flag = Arc::clone(&stop);

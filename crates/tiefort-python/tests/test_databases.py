@@ -78,6 +78,9 @@ def test_a_callback_that_raises_ends_a_build_which_goes_on_later(tmp_path: Path)
 
 
 def test_after_ctrl_c_a_build_goes_on_at_once(tmp_path: Path) -> None:
+    # One tile, which goes on for longer than a run is waited for.
+    area = {**JOB["area"], "size_m": [12_000, 12_000]}
+    job = {**JOB, "area": area, "tiles": {"rows": 1, "columns": 1}, "tin": {"effort": "best"}}
     program = f"""
 import os, signal, threading, tiefort
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -86,7 +89,7 @@ def send(progress):
     if progress.what == "started" and progress.stage == "refine" and not sent:
         sent.append(threading.Timer(0.01, os.kill, (os.getpid(), signal.SIGINT)))
         sent[0].start()
-job, out = {JOB!r}, {str(tmp_path / "a.tdb")!r}
+job, out = {job!r}, {str(tmp_path / "a.tdb")!r}
 try:
     tiefort.build(job, out, workers=1, html=False, progress=send)
 except KeyboardInterrupt:

@@ -78,18 +78,6 @@ def test_nan_and_nodata_are_void() -> None:
     assert meshes[0].residual.max_m < 60
 
 
-@pytest.mark.parametrize("effort", ["fast", "normal", "best"])
-def test_beside_voids_no_vertex_stands_outside_the_ground(effort: Any) -> None:
-    row, col = np.mgrid[0:101, 0:121]
-    dem = (1000 + 80 * np.sin(row / 10) * np.cos(col / 15)).astype(np.float32)
-    whole = tiefort.tin(dem, triangles=500, spacing_m=25, effort=effort).residual
-    dem[20:50, 30:70] = np.nan
-    mesh = tiefort.tin(dem, triangles=500, spacing_m=25, effort=effort)
-    heights = mesh.vertices[:, 2]
-    assert np.nanmin(dem) - 16 < heights.min() and heights.max() < np.nanmax(dem) + 16
-    assert mesh.residual.rms_m < 1.5 * whole.rms_m and mesh.residual.max_m < 5 * whole.max_m
-
-
 def test_files_have_the_bytes_of_the_command_line(tmp_path: Path) -> None:
     raster = tmp_path / "dem.tif"
     assert run("sample", "--out", raster).returncode == 0

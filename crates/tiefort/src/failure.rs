@@ -134,11 +134,6 @@ impl Failure {
         Self { message: error.to_string(), hint: error.hint(), code, cause }
     }
 
-    /// With another hint.
-    pub fn with_hint(self, hint: &str) -> Self {
-        Self { hint: Some(hint.to_owned()), ..self }
-    }
-
     /// With the exit code of the signal that came, if one did: then that is why.
     pub fn after(self, signal: Option<u8>) -> Self {
         Self { code: signal.unwrap_or(self.code), ..self }

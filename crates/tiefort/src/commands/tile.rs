@@ -7,7 +7,7 @@ use job::Job;
 use terrain::TileId;
 
 use crate::arguments::{RunArguments, row_col};
-use crate::failure::{Cause, Failure, Outcome};
+use crate::failure::{Failure, Outcome};
 use crate::run::{Finished, Run};
 
 const AFTER_HELP: &str = "\
@@ -52,10 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Ok(Finished { report: rebuilt.report, tiles, is_unchanged: false })
     });
     // Where what stands on the ground or clips edges is not whole, a tile by itself is refused.
-    ended.map_err(|failure| match failure.cause() {
-        Cause::Stopped => failure.with_hint("`tiefort build` goes on from here"),
-        _ => failure,
-    })
+    ended.map_err(|failure| failure.hinted_where("stopped in stage", "`tiefort build` goes on from here"))
 }
 
 /// Refuses a tile that the job does not have.
