@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use crate::clean::Notes;
 use crate::decks::{Passage, Water, between, passages};
-use crate::pieces::{is_narrow, moved};
+use crate::pieces::{is_narrow, moved, strip_width};
 use crate::{Edge, FeatureId, Flaw, Kind, Network, Place, Remark, Remedy};
 
 /// Times of what it may be cut that ground may stand above a deck, which is then raised with its ramps.
@@ -69,7 +69,7 @@ fn unit(from: Place, to: Place) -> [f64; 2] {
 fn stations(network: &Network, edge: u32, ends: [u32; 2], along: [[f64; 2]; 2], sign: f64) -> Vec<Place> {
     let lattice = network.lattice;
     let [from, to] = ends.map(|node| network.nodes[node as usize].place);
-    let half = f64::from(network.traits(edge).width) / (2.0 * f64::from(lattice.quanta_per_step()));
+    let half = f64::from(strip_width(network.traits(edge), lattice)) / (2.0 * f64::from(lattice.quanta_per_step()));
     let own = unit(from, to);
     let aside = along.map(|[east, north]| {
         let reach = sign * half / (east * own[0] + north * own[1]).max(0.5);

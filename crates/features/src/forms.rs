@@ -13,7 +13,7 @@ use crate::decks::between;
 use crate::exact::Segment;
 use crate::inside::{Inside, LINES_AT_ONCE};
 use crate::middles::{Middle, middles};
-use crate::pieces::{Piece, pieces};
+use crate::pieces::{Piece, is_narrow, pieces};
 use crate::room::{Sharing, Squares, by_corners, remark_rooms};
 use crate::snap::snap_round;
 use crate::strand::{Graded, Role, Strand};
@@ -313,8 +313,7 @@ pub(crate) fn stations(strand: &Strand, site: &Site, shared: &dyn Fn(Place) -> b
 fn remark_narrow(network: &Network, pieces: &[Piece], remarks: &mut Vec<Remark>) {
     for piece in pieces {
         let asks = matches!(piece.traits.form, Form::Strip | Form::StripAlways | Form::Bench);
-        let narrow = piece.traits.width < crate::pieces::STRIP_STEPS_MIN * network.lattice.quanta_per_step();
-        if asks && narrow {
+        if asks && is_narrow(&piece.traits, network) {
             let place = network.nodes[piece.nodes[0] as usize].place;
             let mut notes = Notes { id: piece.id(network, 0), lattice: network.lattice, remarks };
             notes.write_at(place, Flaw::TooNarrow, Remedy::BecameLine);
@@ -666,6 +665,24 @@ mod tests {
         let formed = formed(sources, |_, north| 0.2 * north);
         assert!(!formed.decks.is_empty() && formed.decks.iter().all(|deck| deck.id.number == 2));
         assert!(formed.edges.iter().all(|edge| edge.id.number != 2));
+    }
+
+    #[test]
+    fn a_narrow_way_becomes_a_line_but_its_bridge_keeps_a_deck() {
+        let sources = vec![
+            way(1, "highway=service width=1", &[(10.0, 20.0), (20.0, 20.0)]),
+            way(2, "highway=service width=1 bridge=yes", &[(20.0, 20.0), (40.0, 20.0)]),
+            way(3, "highway=service width=1", &[(40.0, 20.0), (45.0, 20.0)]),
+        ];
+        let formed = formed(sources, |_, north| 0.2 * north);
+        assert!(formed.faces.is_empty(), "{:?}", formed.faces);
+        let length = formed.decks.iter().map(|deck| {
+            let cols = deck.corners.iter().map(|(place, _)| place.col);
+            cols.clone().max().unwrap() - cols.min().unwrap()
+        });
+        assert_eq!(length.sum::<i32>(), 20 * site().lattice.steps_per_post());
+        let narrow = formed.remarks.iter().filter(|remark| remark.flaw == Flaw::TooNarrow);
+        assert_eq!(narrow.map(|remark| remark.id.number).collect::<Vec<_>>(), [1, 3]);
     }
 
     type Drawn = (usize, Vec<(i32, i32)>);

@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::clean::Notes;
 use crate::decks::{Clearances, Passage, Water, between, passages, straighten};
 use crate::exact::Segment;
+use crate::pieces::strip_width;
 use crate::sweep::{Swept, highest};
 use crate::{Flaw, Kind, Network, Place, Remark, Remedy, Storey};
 
@@ -212,7 +213,8 @@ impl Belows<'_> {
     /// Half its width, in steps; a line of water has none, its banks are lines of their own.
     fn half(&self, number: u32) -> f64 {
         let quanta = f64::from(2 * self.network.lattice.quanta_per_step());
-        self.water(number).map_or_else(|| f64::from(self.network.traits(number).width) / quanta, |_| 0.0)
+        self.water(number)
+            .map_or_else(|| f64::from(strip_width(self.network.traits(number), self.network.lattice)) / quanta, |_| 0.0)
     }
 
     fn layer(&self, number: u32) -> i32 {

@@ -1,7 +1,7 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
 use crate::thin::{Station, thin};
-use crate::{FeatureId, Form, Grant, Grants, Network, Place, Site, Traits};
+use crate::{FeatureId, FeatureLattice, Form, Grant, Grants, Network, Place, Site, Traits};
 
 /// Steps of the lattice below which a strip is a line.
 pub const STRIP_STEPS_MIN: i32 = 4;
@@ -38,7 +38,8 @@ impl Piece {
 pub fn sides(network: &Network) -> Vec<[Place; 2]> {
     let mut sides: Vec<[Place; 2]> = network.nodes.iter().map(|node| [node.place; 2]).collect();
     for chain in network.chains() {
-        let half = f64::from(chain.traits.width) / (2.0 * f64::from(network.lattice.quanta_per_step()));
+        let half = f64::from(strip_width(&chain.traits, network.lattice))
+            / (2.0 * f64::from(network.lattice.quanta_per_step()));
         let place = |at: usize| network.nodes[chain.nodes[at] as usize].place;
         for (at, &node) in chain.nodes.iter().enumerate() {
             let [east, north] = place(at.saturating_sub(1)).to(place((at + 1).min(chain.nodes.len() - 1)));
@@ -117,7 +118,17 @@ pub fn pieces(
 
 /// Whether a way is too narrow for a strip.
 pub(crate) fn is_narrow(traits: &Traits, network: &Network) -> bool {
-    traits.width < STRIP_STEPS_MIN * network.lattice.quanta_per_step()
+    strip_width(traits, network.lattice) < strip_width_min(network.lattice)
+}
+
+/// The width of a way's strip, in quanta. A deck is as wide as a strip has to be, since without one there is no bridge.
+pub(crate) fn strip_width(traits: &Traits, lattice: FeatureLattice) -> i32 {
+    if traits.storey.is_deck() { traits.width.max(strip_width_min(lattice)) } else { traits.width }
+}
+
+/// The least width of a strip, in quanta.
+fn strip_width_min(lattice: FeatureLattice) -> i32 {
+    STRIP_STEPS_MIN * lattice.quanta_per_step()
 }
 
 /// The form a way may have: the lesser of what it asks for and what it is granted; decks are always wide.

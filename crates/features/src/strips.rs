@@ -6,7 +6,7 @@
 //!       right ──────┴────── right
 //! ```
 
-use crate::pieces::{Piece, STRIP_STEPS_MIN, moved};
+use crate::pieces::{Piece, STRIP_STEPS_MIN, moved, strip_width};
 use crate::rings::doubled_area;
 use crate::{FeatureId, Network, Place};
 
@@ -171,7 +171,7 @@ fn face(network: &Network, pieces: &[Piece], of: &Wide, mut corners: Vec<(Place,
 pub(crate) fn arms(network: &Network, pieces: &[Piece], wide: &[Wide]) -> Vec<Arm> {
     let mut arms = Vec::with_capacity(2 * wide.len());
     for (number, of) in (0..).zip(wide) {
-        let width = pieces[of.piece as usize].traits.width;
+        let width = strip_width(&pieces[of.piece as usize].traits, network.lattice);
         let half = f64::from(width) / f64::from(network.lattice.quanta_per_step()) / 2.0;
         for (node, other, last) in [(of.a, of.b, false), (of.b, of.a, true)] {
             let to = network.nodes[node as usize].place.to(network.nodes[other as usize].place);

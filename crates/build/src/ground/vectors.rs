@@ -146,13 +146,22 @@ impl Vectors {
                 VectorShape::Polygon(rings) => Shape::Polygon(rings.iter().map(line).collect()),
             };
             let text = |(key, value): &(Arc<str>, Arc<str>)| (key.to_string(), value.to_string());
-            let number = names.len() as i64;
+            let (numbering, number) = (numbering_of(&id), names.len() as i64);
             names.push(id);
-            let id = FeatureId { source, numbering: Numbering::Row, number };
+            let id = FeatureId { source, numbering, number };
             self.sources.push(Source { id, tags: tags.iter().map(text).collect(), kind: *kind, shape });
         }
         self.names.push(names);
         Ok(())
+    }
+}
+
+/// What a feature is in OpenStreetMap, whose rivers are drawn downstream, as its name tells in whatever file it stands.
+fn numbering_of(name: &str) -> Numbering {
+    match name.split_once('/') {
+        Some(("way", _)) => Numbering::Way,
+        Some(("relation", _)) => Numbering::Relation,
+        _ => Numbering::Row,
     }
 }
 

@@ -1,12 +1,12 @@
 //! Roads and rivers as the middle lines of load modules tell them, against the triangles: whether what is kept has its
-//! edges, from end to end, and lies on the ground, and where it ends although its way goes on. Only files of load
-//! modules are asked.
+//! edges, from end to end, and lies on the ground, whether bridges have decks, and where what is kept ends although its
+//! way goes on. Only files of load modules are asked.
 
 use std::collections::BTreeMap;
 
 use build::ground::GamingArea;
 use job::Job;
-use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{LineKind, LineStorey, LoadModule, ModuleLine, ModuleVertex, QUANTA_PER_METRE, metres_of_quanta};
 
 use super::laid::place_text;
 use super::modules::Modules;
@@ -39,6 +39,8 @@ pub(crate) struct Ways {
     pub found: WaysFound,
     /// The first place at which an edge is missing.
     missing: Option<At>,
+    /// Stretches of bridges that are kept along which no deck lies, each with its metres.
+    undecked: Vec<(f64, At)>,
     /// Vertices of lines in the ground that do not lie on it, with metres.
     off: Vec<(f64, At)>,
     /// What meets at each place: of kept ends, kept lines that pass, and lines that are left out.
@@ -82,6 +84,11 @@ impl Ways {
             let off = places.iter().zip(&heights).map(|(&at, &height)| (ground.off_m(at, height), at));
             self.off.extend(off.filter(|(off_m, _)| OFF_MAX_M < *off_m));
         }
+        if traits.is_kept && traits.storey == LineStorey::Bridge {
+            let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
+            let bare = stretches(&places, &heights, |ends, heights| ground.undecked(ends, heights));
+            self.undecked.extend(bare.into_iter().filter(|(long_m, _)| BARE_MIN_M < *long_m));
+        }
         if traits.kind == LineKind::Breakline {
             return;
         }
@@ -103,24 +110,12 @@ impl Ways {
 
     /// Looks for the pieces of a line in the triangles: stretches along which no edge and no other way's ground lies.
     fn look(&mut self, places: &[At], heights: &[i32], kind: LineKind, ground: &Ground) {
-        let mut bare: Vec<(f64, f64, At)> = Vec::new();
-        let mut along_m = 0.0;
-        for (ends, heights) in places.windows(2).zip(heights.windows(2)) {
-            let length_m = length_m(ends);
-            for (from, to) in ground.bare([ends[0], ends[1]], [heights[0], heights[1]]) {
-                let (from, to) = (along_m + from * length_m, along_m + to * length_m);
-                match bare.last_mut() {
-                    Some(last) if from - last.1 < BARE_MIN_M => last.1 = to,
-                    _ => bare.push((from, to, ends[0])),
-                }
-            }
-            along_m += length_m;
-        }
+        let bare = stretches(places, heights, |ends, heights| ground.bare(ends, heights));
         // Streams pass below roads without edges.
         let least = if kind == LineKind::Channel { GAP_MIN_M } else { BARE_MIN_M };
-        for (from, to, at) in bare.into_iter().filter(|(from, to, _)| least < to - from) {
+        for (long_m, at) in bare.into_iter().filter(|(long_m, _)| least < *long_m) {
             self.found.pieces_missing += 1;
-            self.found.gaps += u64::from(GAP_MIN_M < to - from);
+            self.found.gaps += u64::from(GAP_MIN_M < long_m);
             self.missing = self.missing.or(Some(at));
         }
     }
@@ -154,7 +149,14 @@ impl Ways {
                 place_text(area, *at)
             )
         });
-        missing.into_iter().chain(off).collect()
+        let undecked = self.undecked.iter().max_by(|one, other| one.0.total_cmp(&other.0)).map(|(long_m, at)| {
+            format!(
+                "load modules: {} stretches of bridges have no deck, the longest {long_m:.1} m {}",
+                self.undecked.len(),
+                place_text(area, *at)
+            )
+        });
+        missing.into_iter().chain(off).chain(undecked).collect()
     }
 }
 
@@ -168,6 +170,25 @@ fn family(kind: LineKind, class: &str) -> u8 {
     }
 }
 
+/// The stretches of a line that `bare` leaves of its pieces, from 0 to 1 along each, with their metres and the vertex
+/// before them. What lies close together is one stretch.
+fn stretches(places: &[At], heights: &[i32], bare: impl Fn([At; 2], [i32; 2]) -> Vec<(f64, f64)>) -> Vec<(f64, At)> {
+    let mut found: Vec<(f64, f64, At)> = Vec::new();
+    let mut along_m = 0.0;
+    for (ends, heights) in places.windows(2).zip(heights.windows(2)) {
+        let length_m = length_m(ends);
+        for (from, to) in bare([ends[0], ends[1]], [heights[0], heights[1]]) {
+            let (from, to) = (along_m + from * length_m, along_m + to * length_m);
+            match found.last_mut() {
+                Some(last) if from - last.1 < BARE_MIN_M => last.1 = to,
+                _ => found.push((from, to, ends[0])),
+            }
+        }
+        along_m += length_m;
+    }
+    found.into_iter().map(|(from, to, at)| (to - from, at)).collect()
+}
+
 fn length_m(ends: &[At]) -> f64 {
     let [north, east] = [ends[1].0 - ends[0].0, ends[1].1 - ends[0].1].map(|quanta| metres_of_quanta(quanta as i32));
     north.hypot(east)
@@ -176,10 +197,10 @@ fn length_m(ends: &[At]) -> f64 {
 /// The triangles of a load module, as lines are looked for in them.
 struct Ground<'a> {
     square: Square<'a>,
-    /// Triangles that have a class of features.
-    of_features: Vec<[At; 3]>,
-    /// Triangles of decks with their lowest and highest vertex: beside a way that forks where it leaves a bridge, the
-    /// deck reaches as far as both are apart.
+    /// Triangles of the ground that have a class of features, with their lowest and highest vertex.
+    of_features: Vec<([At; 3], [i32; 2])>,
+    /// Triangles of decks, likewise: beside a way that forks where it leaves a bridge, the deck reaches as far as both
+    /// are apart.
     of_decks: Vec<([At; 3], [i32; 2])>,
     /// How far edges may lie off a line that was rounded with them, in quanta.
     aside: f64,
@@ -190,15 +211,15 @@ impl<'a> Ground<'a> {
         let square = Square::of(module);
         let of_features = module.triangles.iter().zip(&module.classes);
         let of_features = of_features.filter(|(_, class)| first_class <= usize::from(**class));
-        let of_features = of_features.map(|(triangle, _)| square.corners(triangle)).collect();
-        let decks = &module.decks;
-        let of_deck = |triangle: &[u16; 3]| {
-            let corners = triangle.map(|corner| decks.vertices[usize::from(corner)]);
+        let with_heights = |vertices: &[ModuleVertex], triangle: &[u16; 3]| {
+            let corners = triangle.map(|corner| vertices[usize::from(corner)]);
             let heights = corners.map(|corner| corner.z);
             let [low, high] = [heights.into_iter().min(), heights.into_iter().max()].map(Option::unwrap_or_default);
             (corners.map(|corner| square.at(corner.y, corner.x)), [low, high])
         };
-        let of_decks = decks.triangles.iter().map(of_deck).collect();
+        let of_features = of_features.map(|(triangle, _)| with_heights(&module.vertices, triangle)).collect();
+        let decks = &module.decks;
+        let of_decks = decks.triangles.iter().map(|triangle| with_heights(&decks.vertices, triangle)).collect();
         Self { square, of_features, of_decks, aside }
     }
 
@@ -222,14 +243,31 @@ impl<'a> Ground<'a> {
     fn bare(&self, [a, b]: [At; 2], heights: [i32; 2]) -> Vec<(f64, f64)> {
         let line = Along::of(a, b);
         let edges = self.square.edges.iter().filter_map(|ends| line.beside(*ends, self.aside));
-        // Corners of strips are rounded as lines are.
-        let asides = [-self.aside, 0.0, self.aside];
-        let within = |corners: &[At; 3]| asides.map(|aside| line.within(*corners, aside)).into_iter().flatten();
-        let [low, high] = [heights[0].min(heights[1]), heights[0].max(heights[1])];
-        let is_as_high = |[lowest, highest]: [i32; 2]| lowest - DECK_OFF < high && low < highest + DECK_OFF;
-        let decks = self.of_decks.iter().filter(|(_, heights)| is_as_high(*heights)).map(|(corners, _)| corners);
-        line.bare(edges.chain(self.of_features.iter().chain(decks).flat_map(within)).collect())
+        let decks = self.of_decks.iter().filter(|(_, of_deck)| is_as_high(*of_deck, heights));
+        let there = self.of_features.iter().chain(decks).flat_map(|(corners, _)| self.within(&line, *corners));
+        line.bare(edges.chain(there).collect())
     }
+
+    /// Parts of a bridge between two places with their heights, from 0 to 1, along which no deck lies but such as pass
+    /// below it. Decks may be higher than the line, since they rise where the ground would stand above them; where ways
+    /// meet at the end of a bridge the ground is as high.
+    fn undecked(&self, [a, b]: [At; 2], heights: [i32; 2]) -> Vec<(f64, f64)> {
+        let line = Along::of(a, b);
+        let low = heights[0].min(heights[1]);
+        let decks = self.of_decks.iter().filter(|(_, [_, highest])| low < highest + DECK_OFF);
+        let ground = self.of_features.iter().filter(|(_, of_ground)| is_as_high(*of_ground, heights));
+        line.bare(decks.chain(ground).flat_map(|(corners, _)| self.within(&line, *corners)).collect())
+    }
+
+    /// The parts of a line inside a triangle, whose corners may be rounded as lines are.
+    fn within(&self, line: &Along, corners: [At; 3]) -> impl Iterator<Item = (f64, f64)> + use<> {
+        [-self.aside, 0.0, self.aside].map(|aside| line.within(corners, aside)).into_iter().flatten()
+    }
+}
+
+/// Whether a triangle, from its lowest to its highest vertex, may carry a line with these heights at its ends.
+fn is_as_high([lowest, highest]: [i32; 2], [one, other]: [i32; 2]) -> bool {
+    lowest - DECK_OFF < one.max(other) && one.min(other) < highest + DECK_OFF
 }
 
 /// A straight line between two places.
@@ -296,7 +334,7 @@ impl Along {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Decks, ModuleId, ModuleResidual, ModuleVertex, Objects};
+    use terrain::{Decks, ModuleId, ModuleResidual, Objects};
 
     #[test]
     fn triangles_of_a_strip_leave_nothing_of_its_middle_line_bare() {
@@ -332,5 +370,7 @@ mod tests {
         };
         let bare = |deck| Ground::of(&module(deck), 1, 8.0).bare([(1000, 3000), (1000, 5000)], [0, 64]).len();
         assert_eq!([bare(0), bare(128), bare(64 + 128), bare(900), bare(-128)], [0, 0, 1, 1, 1]);
+        let undecked = |deck| Ground::of(&module(deck), 1, 8.0).undecked([(1000, 3000), (1000, 5000)], [0, 64]).len();
+        assert_eq!([undecked(0), undecked(900), undecked(-128)], [0, 0, 1]);
     }
 }

@@ -186,11 +186,11 @@ impl Laid {
                     [(ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]), (ends[1][2] - ends[0][2]).abs()];
                 let greatest = f64::from(line.grade_most_ppm) / 1e6;
                 if line.role == Role::Centre && 0.0 < greatest && !self.was_told("grade") {
-                    assert!(rise <= greatest * run + 1.0 / 64.0, "{name}: {rise} m on {run} m");
+                    assert!(rise <= greatest * run + 1.0 / 64.0, "{name}: {rise} m on {run} m, {ends:?}");
                 }
                 let is_crossed = ends.iter().any(|at| travelled.contains(&[at[0].to_bits(), at[1].to_bits()]));
                 if line.role == Role::Shore && !is_crossed {
-                    assert_eq!(rise, 0.0, "a lake is level");
+                    assert_eq!(rise, 0.0, "a lake is level: {ends:?}");
                 }
             }
         }
