@@ -42,7 +42,6 @@ mod posts;
 pub use posts::{PostHeights, residuals_at_posts, residuals_by_class};
 mod sight;
 pub use sight::{Draw, EYE_M, LineOfSight, Pair, RANGE_M, drawn_pairs, line_of_sight, sees_on};
-mod samples;
 mod slope;
 pub use slope::{GRADES, SlopeClasses, SlopeDifference, slope, slope_classes};
 mod hausdorff;

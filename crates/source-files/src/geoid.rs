@@ -9,8 +9,8 @@ use terrain::{GridFrame, Post, PostRect, QUANTA_PER_METRE};
 use crate::RasterFrame;
 use crate::crs::Crs;
 use crate::frame::SampleScale;
+use crate::samples::VoidPosts;
 use crate::samples::{Samples, union};
-use crate::void_posts::VoidPosts;
 
 /// Heights of a datum's zero above the ellipsoid, as far as they were read.
 #[derive(Debug)]

@@ -24,7 +24,6 @@ mod perspective;
 mod relief;
 mod residual_map;
 mod scene;
-mod seen;
 mod sheet;
 mod sight;
 mod text;
@@ -41,9 +40,9 @@ pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
 pub use relief::Shown;
 pub use residual_map::RESIDUAL_SCALE_M;
 pub use scene::{NO_RESIDUAL, Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
-pub use seen::{SeenGround, draw_seen};
 pub(crate) use sheet::{Drawing, Key, Legend, length_text, round_length};
 pub use sight::{Eye, Sight, draw_sight};
+pub use sight::{SeenGround, draw_seen};
 pub(crate) use wireframe::module_pictures;
 
 /// A map of a scene.
