@@ -58,7 +58,7 @@ pub use seam::{SeamVisibility, seam_visibility};
 mod form;
 pub use form::{MeshForm, SLIVER_DEGREES, mesh_form};
 mod features;
-pub use features::{Bodies, FeatureFigures, deck_figures, missing_edges};
+pub use features::{Bodies, FeatureFigures};
 mod limit;
 pub use limit::{Curvature, Limit, curvature, limit};
 mod registration;

@@ -121,11 +121,6 @@ impl WideMosaic {
         patch
     }
 
-    /// How many strips or tiles were decoded so far, counting each time.
-    pub fn decoded(&self) -> u64 {
-        self.windows.decoded()
-    }
-
     /// A window of a joint in which every post holds a height, and how each stands.
     fn settled(&self, joint: &Joint, window: PostRect) -> Result<(Raster, Vec<Standing>), SourceError> {
         let (mut raster, mut standings) = joint.read(&self.windows, window)?;

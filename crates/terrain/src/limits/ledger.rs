@@ -51,7 +51,7 @@ struct Account {
 
 impl Ledger {
     /// A ledger from which nothing has been spent.
-    pub fn new(allowance: Allowance) -> Self {
+    pub(crate) fn new(allowance: Allowance) -> Self {
         assert_eq!(allowance.module_room.len(), allowance.modules.count(), "one room per load module");
         assert_eq!(allowance.window_room.len(), allowance.windows.count(), "one room per window");
         let count = allowance.module_room.len();
@@ -70,13 +70,13 @@ impl Ledger {
     }
 
     /// Triangles `module` may still gain.
-    pub fn room_of(&self, module: ModuleId) -> u32 {
+    pub(crate) fn room_of(&self, module: ModuleId) -> u32 {
         let index = self.module_index(module);
         self.allowance.module_room[index].saturating_sub(self.modules[index].spent)
     }
 
     /// Whether `module`, or a window that holds it, has more than it may.
-    pub fn is_over(&self, module: ModuleId) -> bool {
+    pub(crate) fn is_over(&self, module: ModuleId) -> bool {
         let index = self.module_index(module);
         self.allowance.module_room[index] < self.modules[index].spent || self.least_left(module) < 0
     }
@@ -130,7 +130,7 @@ impl Ledger {
     ///
     /// A point costs two triangles wherever it lies, and a window may hold both load modules beside a side
     /// point, so windows are asked for two. One that has room for a single triangle stays as it is.
-    pub fn refuses(&self, module: ModuleId, cost: u32, beyond_tile: bool) -> Option<RefusedBy> {
+    pub(crate) fn refuses(&self, module: ModuleId, cost: u32, beyond_tile: bool) -> Option<RefusedBy> {
         if self.room_of(module) < cost {
             return Some(if beyond_tile { RefusedBy::Reservation } else { RefusedBy::Module });
         }
@@ -146,7 +146,7 @@ impl Ledger {
     }
 
     /// Looks at the windows of every load module again, so that many points are judged fast.
-    pub fn look_again(&mut self) {
+    pub(crate) fn look_again(&mut self) {
         for (index, module) in self.allowance.modules.iter().enumerate() {
             let (left, booked) = (self.least_left(module), self.booked);
             self.modules[index] = Account { left, booked, ..self.modules[index] };
@@ -157,7 +157,7 @@ impl Ledger {
     ///
     /// # Panics
     /// When a limit refuses them: the caller asks first.
-    pub fn charge(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn charge(&mut self, module: ModuleId, cost: u32) {
         self.book(module, cost);
         let index = self.module_index(module);
         let Account { spent, left, .. } = self.modules[index];
@@ -167,7 +167,7 @@ impl Ledger {
     }
 
     /// Notes `cost` triangles that `module` has already, whether or not it may.
-    pub fn book(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn book(&mut self, module: ModuleId, cost: u32) {
         let mut least = i32::MAX;
         for row in self.window_rows(module) {
             for left in &mut self.left[row] {
@@ -192,7 +192,7 @@ impl Ledger {
     ///
     /// # Panics
     /// When there are not so many.
-    pub fn refund(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn refund(&mut self, module: ModuleId, cost: u32) {
         let take = |count: &mut u32| *count = count.checked_sub(cost).expect("only what was booked is refunded");
         let index = self.module_index(module);
         take(&mut self.modules[index].spent);
@@ -205,7 +205,7 @@ impl Ledger {
     /// Takes room in `module` for points a neighbour has chosen and paid for.
     ///
     /// Reservations keep this room free; what they could not foresee (pins) ends at zero.
-    pub fn inherit(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn inherit(&mut self, module: ModuleId, cost: u32) {
         let index = self.module_index(module);
         let room = &mut self.allowance.module_room[index];
         *room = room.saturating_sub(cost);

@@ -36,7 +36,7 @@ pub use errors::{draw_errors, draw_module_limits};
 pub use facets::{Cover, Facets};
 pub use image::Image;
 pub use panels::{Panel, Style, draw_panels};
-pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
+pub use perspective::{Drawn, Look, Surface};
 pub use relief::Shown;
 pub use residual_map::RESIDUAL_SCALE_M;
 pub use scene::{NO_RESIDUAL, Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
@@ -62,13 +62,6 @@ pub enum Map {
     Tiles,
     /// Roads and water, and what became of them.
     Features,
-}
-
-impl Map {
-    /// Whether it shows the ground that the load modules were made from.
-    pub fn needs_ground(&self) -> bool {
-        matches!(self, Map::Relief(Shown::Dem | Shown::Both) | Map::Residuals(_))
-    }
 }
 
 /// Draws a map whose longer side is `longest` pixels, with all that stands around it.
