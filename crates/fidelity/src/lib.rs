@@ -62,9 +62,8 @@ pub use features::{Bodies, FeatureFigures};
 mod limit;
 pub use limit::{Curvature, Limit, curvature, limit};
 mod registration;
+pub use measures::{RegularGrid, regular_grid};
 pub use registration::{Registration, SHIFT_POSTS_MAX, registration};
-mod regular;
-pub use regular::{RegularGrid, regular_grid};
 mod measures;
 pub use measures::{DemGround, Measures, ResidualFigures};
 
