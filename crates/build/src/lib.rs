@@ -65,7 +65,6 @@ pub use sums::{Adding, Sums};
 mod survey;
 mod tasks;
 pub use tasks::{inherited, is_surveyed, posts_of, tile_refinement};
-mod without_limits;
 
 pub mod ground;
 pub mod product;

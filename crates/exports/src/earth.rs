@@ -68,7 +68,7 @@ impl Earth {
     /// # Errors
     /// When the datum is not known or cannot be computed and nothing is assumed, or the coordinate system cannot be
     /// computed.
-    pub fn new(product: &Product, assumed: Option<Datum>) -> Result<Self, ExportError> {
+    pub(crate) fn new(product: &Product, assumed: Option<Datum>) -> Result<Self, ExportError> {
         Self::under(&product.manifest.area, product.rect, assumed)
     }
 
@@ -115,7 +115,7 @@ impl Earth {
     }
 
     /// What was done to heights.
-    pub fn datum(&self) -> Datum {
+    pub(crate) fn datum(&self) -> Datum {
         self.datum
     }
 

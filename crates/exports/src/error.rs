@@ -80,11 +80,6 @@ impl ExportError {
         }
     }
 
-    /// Whether the export ended because it was asked to.
-    pub fn is_stopped(&self) -> bool {
-        matches!(self, Self::Stopped { .. })
-    }
-
     /// The same where several databases are read, of which this one is meant.
     pub(crate) fn of(self, name: &str) -> Self {
         match self {

@@ -159,12 +159,12 @@ impl Product {
     }
 
     /// Length of a load module's side in quanta of 1/128 m.
-    pub fn side(&self) -> i32 {
+    pub(crate) fn side(&self) -> i32 {
         self.grid.side_cells * self.frame.spacing.quanta_per_post()
     }
 
     /// Length of a load module's side in metres.
-    pub fn side_m(&self) -> f64 {
+    pub(crate) fn side_m(&self) -> f64 {
         f64::from(self.grid.side_cells) * self.frame.spacing.metres()
     }
 
@@ -180,7 +180,7 @@ impl Product {
     }
 
     /// The load module at (`row`, `col`) of the area, if it is exported.
-    pub fn module(&self, id: ModuleId) -> Option<&LoadModule> {
+    pub(crate) fn module(&self, id: ModuleId) -> Option<&LoadModule> {
         let index =
             |rect: ModuleRect| (id.row - rect.south) as usize * rect.cols() as usize + (id.col - rect.west) as usize;
         self.rect.contains(id).then(|| &self.modules[index(self.rect)])
@@ -254,17 +254,17 @@ impl Product {
     }
 
     /// The EPSG code of the coordinate system, where it is named by one.
-    pub fn epsg(&self) -> Option<u32> {
+    pub(crate) fn epsg(&self) -> Option<u32> {
         self.crs().strip_prefix("EPSG:").and_then(|code| code.parse().ok())
     }
 
     /// What heights are above; empty when unknown.
-    pub fn vertical_datum(&self) -> &str {
+    pub(crate) fn vertical_datum(&self) -> &str {
         &self.manifest.area.vertical_datum
     }
 
     /// Whom to thank for the sources.
-    pub fn attributions(&self) -> Vec<&str> {
+    pub(crate) fn attributions(&self) -> Vec<&str> {
         self.manifest.sources.iter().filter_map(|source| source.attribution.as_deref()).collect()
     }
 

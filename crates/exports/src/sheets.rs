@@ -19,10 +19,10 @@ pub enum Sheet {
 
 impl Sheet {
     /// All of them, in the order in which files have them.
-    pub const ALL: [Self; 4] = [Self::Ground, Self::Decks, Self::Ribbons, Self::Objects];
+    pub(crate) const ALL: [Self; 4] = [Self::Ground, Self::Decks, Self::Ribbons, Self::Objects];
 
     /// What it is called in files.
-    pub const fn name(self) -> &'static str {
+    pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Ground => "ground",
             Self::Decks => "decks",

@@ -69,11 +69,6 @@ impl Tileset {
         Ok(Self { layers, text, square_of })
     }
 
-    /// What was done to heights.
-    pub fn datum(&self) -> Datum {
-        self.layers.earth.datum()
-    }
-
     /// The bytes of a file by its name in the export; `None` where the export has none of this name.
     ///
     /// # Errors

@@ -78,7 +78,7 @@ impl FeatureFigures {
 }
 
 /// How far the decks of load modules stand above the ground.
-pub fn deck_figures<'a>(modules: impl IntoIterator<Item = &'a LoadModule>) -> DeckFigures {
+pub(crate) fn deck_figures<'a>(modules: impl IntoIterator<Item = &'a LoadModule>) -> DeckFigures {
     let mut all = DeckFigures::default();
     modules
         .into_iter()
@@ -100,7 +100,7 @@ fn owned_edges(kept: &Features, rect: PostRect, area: PostRect) -> u64 {
 }
 
 /// Edges of features that a TIN has neither whole nor in collinear parts, by place in steps of the features' lattice.
-pub fn missing_edges(tin: &Tin, kept: &Features) -> Vec<[LatticePoint; 2]> {
+pub(crate) fn missing_edges(tin: &Tin, kept: &Features) -> Vec<[LatticePoint; 2]> {
     if kept.edges.is_empty() {
         return Vec::new();
     }
@@ -220,7 +220,7 @@ impl<'a> Bodies<'a> {
     }
 
     /// The level of the lake that a place, in steps of the features' lattice, lies in or on the shore of.
-    pub fn lake_level(&self, at: LatticePoint) -> Option<i32> {
+    pub(crate) fn lake_level(&self, at: LatticePoint) -> Option<i32> {
         let first = self.near(at).find(|body| body.holds(at, self.steps))?;
         (first.ground == SurfaceGround::Lake).then_some(first.level)
     }

@@ -42,7 +42,7 @@ impl PostHeights {
     }
 
     /// The posts.
-    pub fn rect(&self) -> PostRect {
+    pub(crate) fn rect(&self) -> PostRect {
         self.rect
     }
 

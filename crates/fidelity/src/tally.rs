@@ -109,7 +109,7 @@ impl Tally {
     }
 
     /// Mean residual in metres, positive where the DEM lies above the TIN; 0 without posts.
-    pub fn mean_m(&self) -> f64 {
+    pub(crate) fn mean_m(&self) -> f64 {
         self.per_post(self.sum as f64) / f64::from(QUANTA_PER_METRE)
     }
 
@@ -167,7 +167,7 @@ impl Sums {
 
     /// Counts posts by residuals in quanta, rounded half away from zero, here and in a histogram; NaN is left out.
     #[inline(always)]
-    pub fn add_rounded(&mut self, residuals: &[f64], mut histogram: Histogram) {
+    pub(crate) fn add_rounded(&mut self, residuals: &[f64], mut histogram: Histogram) {
         let mut whole = [0; TOGETHER];
         for residuals in residuals.chunks(TOGETHER) {
             let mut known = 0;
@@ -186,7 +186,7 @@ impl Sums {
 
     /// Counts some posts, fewer than 2^16.
     #[inline(always)]
-    pub fn add_all(&mut self, residuals: &[i32]) {
+    pub(crate) fn add_all(&mut self, residuals: &[i32]) {
         let (mut sum, mut sum_abs, mut sum_squared) = (0_i64, 0_u64, 0_u64);
         for &residual in residuals {
             let size = u64::from(residual.unsigned_abs());
@@ -239,7 +239,7 @@ pub struct Residuals {
 impl Residuals {
     /// The tally of one class.
     #[inline]
-    pub fn class(&mut self, class: u8) -> &mut Tally {
+    pub(crate) fn class(&mut self, class: u8) -> &mut Tally {
         let class = usize::from(class);
         if self.classes.len() <= class {
             self.classes.resize(class + 1, Tally::default());

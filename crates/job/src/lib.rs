@@ -47,7 +47,6 @@ mod entry;
 mod feature_keys;
 mod files;
 mod load;
-mod object_keys;
 mod read;
 mod sections;
 mod setting_list;

@@ -408,7 +408,7 @@ pub enum Allocation {
 
 impl Method {
     /// Its name.
-    pub fn name(self) -> MethodName {
+    pub(crate) fn name(self) -> MethodName {
         match self {
             Method::Paper { .. } => MethodName::Paper,
             Method::Greedy => MethodName::Greedy,
@@ -428,7 +428,7 @@ impl Job {
     }
 
     /// The folder that paths in the job are relative to.
-    pub fn folder(&self) -> &Path {
+    pub(crate) fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 }

@@ -13,8 +13,8 @@ use crate::bounds::{
     THANKS_CHARS_MAX, TITLE_CHARS_MAX, TRIANGLES_MIN, WEIGHT_MAX, WKT_CHARS_MAX,
 };
 use crate::feature_keys::{FEATURE_SOURCES, FEATURES, RULES};
+use crate::feature_keys::{OBJECT_LIMITS, OBJECT_RULES, OBJECT_SOURCES, OBJECTS};
 use crate::key::FILE_SAYS;
-use crate::object_keys::{OBJECT_LIMITS, OBJECT_RULES, OBJECT_SOURCES, OBJECTS};
 use crate::{
     Allocation, AreaPlace, Borders, ClipHeights, Count, DemSource, Edges, ErrorKey, Key, KeyTable, MethodName,
     OuterBorder, SampleClass, StartMethod,

@@ -5,7 +5,6 @@
 //! A pointer that is null or not aligned is never followed: the function answers as the header says.
 
 mod objects;
-mod pointers;
 mod values;
 
 use std::borrow::Cow;
@@ -17,8 +16,8 @@ use std::sync::Arc;
 use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, Sight, TileFile, open_file};
 use memmap2::Mmap;
 
-use crate::pointers::{give, given};
 use crate::values::{AreaFrame, Decks, Line, Module, Sample, Surface};
+use crate::values::{give, given};
 
 /// `LMR_ALL`: the whole area.
 const ALL: u32 = u32::MAX;

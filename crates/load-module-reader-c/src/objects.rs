@@ -5,7 +5,7 @@ use std::ffi::c_int;
 use load_module_reader::{Corner, Curvature, Hider, LoadedGround, Objects, PastObjects, Sight, Standing};
 
 use crate::INVALID;
-use crate::pointers::{give, given};
+use crate::values::{give, given};
 
 /// `lmr_sighting`.
 #[repr(C)]

@@ -14,7 +14,6 @@ pub use workers::{Workers, for_each_independent};
 mod plan;
 pub use plan::RankedTasks;
 mod ranked;
-mod ready;
 pub use ranked::{Event, in_rank_order, in_rank_order_observed};
 mod heartbeat;
 pub use heartbeat::with_heartbeat;

@@ -59,13 +59,8 @@ impl RankedTasks {
     }
 
     /// How many tasks there are.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.places.len()
-    }
-
-    /// Whether there is no task at all.
-    pub fn is_empty(&self) -> bool {
-        self.places.is_empty()
     }
 
     /// Place of `task` in rank order, counted from 0.
@@ -79,7 +74,7 @@ impl RankedTasks {
     }
 
     /// The neighbours that wait for `task`.
-    pub fn higher(&self, task: usize) -> &[usize] {
+    pub(crate) fn higher(&self, task: usize) -> &[usize] {
         &self.links[self.middles[task]..self.begins[task + 1]]
     }
 

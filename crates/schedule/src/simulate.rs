@@ -4,7 +4,7 @@ use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
 use crate::RankedTasks;
-use crate::ready::Ready;
+use crate::ranked::Ready;
 
 /// What a simulated run took, in the unit of the durations given.
 #[derive(Clone, Copy, Debug, PartialEq)]

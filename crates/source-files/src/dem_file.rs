@@ -128,7 +128,7 @@ impl DemFile {
 
     /// All its posts.
     pub fn rect(&self) -> PostRect {
-        PostRect::of_size(self.header.frame.rows as usize, self.header.frame.cols as usize)
+        self.header.frame.rect()
     }
 
     /// The chunks that hold posts of `window`, in file order.

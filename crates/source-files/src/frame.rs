@@ -4,6 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
+use terrain::PostRect;
+
 use crate::SourceError;
 use crate::crs::vertical::{FOOT_M, US_FOOT_M, unit_m};
 use crate::crs::{Crs, GeoKeys};
@@ -26,6 +28,11 @@ pub struct RasterFrame {
 }
 
 impl RasterFrame {
+    /// All its posts.
+    pub(crate) fn rect(&self) -> PostRect {
+        PostRect::of_size(self.rows as usize, self.cols as usize)
+    }
+
     /// The frame of a raster stored with these axes, and whether its first row is the southern one.
     pub(crate) fn new(path: &Path, crs: Crs, axes: &Axes, cols: u32, rows: u32) -> Result<(Self, bool), SourceError> {
         let south_first = 0.0 < axes.step[1];

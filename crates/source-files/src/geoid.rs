@@ -9,8 +9,8 @@ use terrain::{GridFrame, Post, PostRect, QUANTA_PER_METRE};
 use crate::RasterFrame;
 use crate::crs::Crs;
 use crate::frame::SampleScale;
+use crate::samples::VoidPosts;
 use crate::samples::{Samples, union};
-use crate::void_posts::VoidPosts;
 
 /// Heights of a datum's zero above the ellipsoid, as far as they were read.
 #[derive(Debug)]
@@ -88,7 +88,7 @@ impl PartialEq for DatumShift {
 
 impl DatumShift {
     /// What is to be added to heights at a place in degrees, in metres; `None` where a grid has no value.
-    pub fn metres(&self, place: [f64; 2]) -> Option<f64> {
+    pub(crate) fn metres(&self, place: [f64; 2]) -> Option<f64> {
         let height = |grid: &Option<Arc<Geoid>>| grid.as_ref().map_or(Some(0.0), |grid| grid.height_m(place));
         Some(height(&self.from_grid)? - height(&self.to_grid)?)
     }

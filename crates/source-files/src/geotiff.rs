@@ -88,7 +88,7 @@ impl GeoTiff {
     }
 
     /// The strips or tiles that hold posts of `window`, in file order.
-    pub fn chunks_of(&self, window: PostRect) -> Vec<u32> {
+    pub(crate) fn chunks_of(&self, window: PostRect) -> Vec<u32> {
         let Some(cut) = self.rect().intersection(&window) else { return Vec::new() };
         let layout = &self.layout;
         let stored = |row: i32| if self.south_first { row as u32 } else { layout.rows - 1 - row as u32 };
@@ -123,7 +123,7 @@ impl GeoTiff {
     ///
     /// # Errors
     /// When the file is gone, or a chunk cannot be decoded.
-    pub fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
+    pub(crate) fn decode(&self, chunks: &[u32]) -> Result<Vec<Chunk>, SourceError> {
         let mut decoder = self.decoder()?;
         chunks.iter().map(|&index| self.decode_with(&mut decoder, index)).collect()
     }
@@ -192,7 +192,7 @@ impl GeoTiff {
     ///
     /// # Panics
     /// When `window` is not inside the raster or a chunk of it is missing.
-    pub fn assemble(&self, window: PostRect, chunks: Vec<Chunk>) -> Result<Raster, SourceError> {
+    pub(crate) fn assemble(&self, window: PostRect, chunks: Vec<Chunk>) -> Result<Raster, SourceError> {
         assert!(self.rect().contains_rect(&window), "a window lies inside the raster");
         Raster::assemble(&self.header(), window, chunks)
     }
@@ -200,7 +200,7 @@ impl GeoTiff {
     /// Decodes and assembles the posts of `window` in this thread.
     ///
     /// # Errors
-    /// As [`GeoTiff::decode`] and [`GeoTiff::assemble`].
+    /// When the file is gone, a chunk cannot be decoded, or a height is infinite or beyond the limit.
     pub fn read(&self, window: PostRect) -> Result<Raster, SourceError> {
         self.assemble(window, self.decode(&self.chunks_of(window))?)
     }

@@ -16,7 +16,6 @@ pub use crs::Crs;
 mod frame;
 pub use frame::{RasterFrame, SampleScale};
 mod geoid;
-mod void_posts;
 pub use geoid::{DatumShift, Geoid, plain_datum};
 mod chunk;
 pub use chunk::Chunk;
@@ -63,7 +62,6 @@ pub use geoparquet::GeoParquet;
 mod kept;
 mod polygons;
 mod shapefile;
-mod shapefile_parts;
 pub use polygons::read_polygons;
 mod features;
 #[cfg(feature = "geoparquet")]

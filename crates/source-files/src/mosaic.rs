@@ -10,7 +10,7 @@ use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Resampling};
 use crate::crs::Crs;
 use crate::geoid::Shifts;
 use crate::join::{Standing, fits, join};
-use crate::samples::{Sample, each, union};
+use crate::samples::{Sample, each};
 use crate::warp::{Place, Warp};
 use crate::{DatumShift, DemFile, Raster, RasterFrame, SourceError};
 
@@ -150,11 +150,6 @@ impl Mosaic {
                 }
             }
         }
-    }
-
-    /// Lowest and highest height of all rasters, in metres.
-    pub fn range_m(&self) -> Option<(f64, f64)> {
-        self.layers.iter().filter_map(|layer| layer.raster.range_m()).reduce(union)
     }
 
     /// Heights at the posts `rect` of the working grid.
@@ -443,10 +438,5 @@ impl DemFile {
     /// The posts that lie under the posts `rect` of a grid in the system `area`; `None` when there are none.
     pub fn window_reaching(&self, area: &Crs, grid: &GridFrame, rect: PostRect) -> Option<PostRect> {
         window_reaching(self.frame(), area, grid, rect)
-    }
-
-    /// Whether its posts are on the way to those of the grid without leaving its coordinate system.
-    pub fn is_in(&self, area: &Crs) -> bool {
-        self.frame().crs == *area
     }
 }

@@ -16,8 +16,8 @@ use crate::features::raw::{Part, RawShape};
 use crate::features::strict::{self, said_in};
 use crate::geopackage::Package;
 use crate::limits::{Allowance, GEOJSON_BYTES_MAX, VERTEX_BYTES};
+use crate::shapefile::Parts;
 use crate::shapefile::Shape;
-use crate::shapefile_parts::Parts;
 use crate::store::Store;
 use crate::{SourceError, geopackage, shapefile};
 

@@ -8,8 +8,7 @@ use terrain::{Dem, Post, PostRect, QUANTA_PER_METRE, quanta_of_metres};
 use crate::chunk::{Chunk, Header, Meaning};
 use crate::frame::{RasterFrame, SampleScale};
 use crate::limits::HEIGHT_M_MAX;
-use crate::samples::{Samples, each, number};
-use crate::void_posts::VoidPosts;
+use crate::samples::{Samples, VoidPosts, each, number};
 use crate::{DatumShift, SourceError};
 
 /// The posts of a window of a raster. Posts are counted from the south-west post of the whole raster.

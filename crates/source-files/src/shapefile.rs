@@ -1,9 +1,14 @@
-//! Shapes from a Shapefile: the records of the `.shp`, without their attributes.
+//! Shapes from a Shapefile: the records of the `.shp`, without their attributes, and the files that belong
+//! to it, beside each other in a folder or in one zip file.
 //!
 //! Read here and not by a library, because the numbers of parts and points in a record have to be held against the
 //! bytes that are there before anything is allocated for them, and because little else of the format is needed.
 
 use crate::SourceError;
+use crate::content::beside;
+use crate::crs::Crs;
+use crate::error::at_most;
+use crate::limits::SHAPEFILE_BYTES_MAX;
 use crate::store::Store;
 
 /// How every one begins.
@@ -47,7 +52,7 @@ pub(crate) fn shapes<'a>(
 
 fn shape(store: &Store, bytes: &[u8], at: usize) -> Result<Shape, SourceError> {
     let record = part(store, bytes, at + 8, 2 * big(&part(store, bytes, at, 8)?[4..]))?;
-    let kind = whole(store, record, 0)?;
+    let kind = little(store, record, 0)?;
     // Plain, with heights, with measures: the places come first in all three, then the heights.
     let has_heights = matches!(kind, 13 | 15);
     Ok(match kind {
@@ -56,7 +61,7 @@ fn shape(store: &Store, bytes: &[u8], at: usize) -> Result<Shape, SourceError> {
         5 | 15 | 25 => Shape::Rings { rings: runs(store, record, has_heights)?, has_heights },
         1 | 11 | 21 => Shape::Points(places(part(store, record, 4, 16)?).collect()),
         8 | 18 | 28 => {
-            let count = whole(store, record, 36)? as usize;
+            let count = little(store, record, 36)? as usize;
             Shape::Points(places(part(store, record, 40, count.saturating_mul(16))?).collect())
         }
         _ => Shape::Other("shape of some other kind"),
@@ -105,7 +110,7 @@ fn places(bytes: &[u8]) -> impl Iterator<Item = [f64; 3]> {
 }
 
 fn runs(store: &Store, record: &[u8], has_heights: bool) -> Result<Vec<Vec<[f64; 3]>>, SourceError> {
-    let (parts, points) = (whole(store, record, 36)? as usize, whole(store, record, 40)? as usize);
+    let (parts, points) = (little(store, record, 36)? as usize, little(store, record, 40)? as usize);
     let starts = part(store, record, 44, parts.saturating_mul(4))?;
     // Parts without points are made of nothing, and there is room for a hundred million of them. One is borne.
     if points.saturating_add(1) < parts {
@@ -139,7 +144,7 @@ fn runs(store: &Store, record: &[u8], has_heights: bool) -> Result<Vec<Vec<[f64;
 }
 
 /// An unsigned number of four bytes, the lowest first.
-fn whole(store: &Store, bytes: &[u8], at: usize) -> Result<u32, SourceError> {
+fn little(store: &Store, bytes: &[u8], at: usize) -> Result<u32, SourceError> {
     let four = part(store, bytes, at, 4)?;
     Ok(u32::from_le_bytes([four[0], four[1], four[2], four[3]]))
 }
@@ -152,4 +157,56 @@ fn part<'a>(store: &Store, bytes: &'a [u8], at: usize, count: usize) -> Result<&
         expected: end as u64,
         found: bytes.len() as u64,
     })
+}
+
+/// A Shapefile: its shapes, and what of the rest is there.
+pub(crate) struct Parts {
+    pub shapes: Store,
+    index: Option<Store>,
+    pub table: Option<Store>,
+    encoding: Option<Store>,
+    system: Option<Store>,
+}
+
+impl Parts {
+    /// What belongs to the shapes in `store`, from where these come from.
+    pub(crate) fn of(store: &Store) -> Result<Self, SourceError> {
+        let shapes = store.clone();
+        if !store.is_packed() {
+            let part = |ending: &str| beside(store.path(), &[ending]).map(|path| Store::plain(&path)).transpose();
+            let (index, table) = (part("shx")?, part("dbf")?);
+            return Ok(Self { shapes, index, table, encoding: part("cpg")?, system: part("prj")? });
+        }
+        let mut packed = Store::zipped_shapefile(store.path())?;
+        let mut part = |ending: &str| {
+            let is_it = |store: &Store| store.name().to_lowercase().ends_with(&format!(".{ending}"));
+            packed.iter().position(is_it).map(|index| packed.remove(index))
+        };
+        let (index, table) = (part("shx"), part("dbf"));
+        Ok(Self { shapes, index, table, encoding: part("cpg"), system: part("prj") })
+    }
+
+    /// The bytes of its index.
+    pub(crate) fn index(&self) -> Result<Option<Vec<u8>>, SourceError> {
+        self.index.as_ref().map(whole).transpose()
+    }
+
+    /// What it says of how texts in its table are written.
+    pub(crate) fn encoding(&self) -> Result<Option<String>, SourceError> {
+        let said = self.encoding.as_ref().map(|store| store.start(64)).transpose()?;
+        Ok(said.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()))
+    }
+
+    /// The coordinate system that it names.
+    pub(crate) fn system(&self) -> Result<Option<Crs>, SourceError> {
+        let Some(store) = &self.system else { return Ok(None) };
+        let crs = Crs::from_wkt(&String::from_utf8_lossy(&store.start(1 << 16)?));
+        crs.map(Some).map_err(|found| SourceError::UnnamedCrs { path: store.path().into(), found })
+    }
+}
+
+/// All bytes of a part, which are held in memory.
+pub(crate) fn whole(store: &Store) -> Result<Vec<u8>, SourceError> {
+    at_most(store.path(), store.len(), SHAPEFILE_BYTES_MAX, "bytes")?;
+    store.start(SHAPEFILE_BYTES_MAX)
 }

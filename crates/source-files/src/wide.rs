@@ -111,7 +111,7 @@ impl WideMosaic {
             for (post, standing) in rect.posts().zip(&mut patch.standings) {
                 if *standing == Standing::Gap
                     && let Some(place) = places.at(post.row, post.col)
-                    && let Some(corner) = Corner::around(place, &joint.header.frame, joint.rect())
+                    && let Some(corner) = Corner::around(place, &joint.header.frame, joint.header.frame.rect())
                     && corner.posts().posts().all(holds)
                 {
                     *standing = Standing::Height;
@@ -119,11 +119,6 @@ impl WideMosaic {
             }
         }
         patch
-    }
-
-    /// How many strips or tiles were decoded so far, counting each time.
-    pub fn decoded(&self) -> u64 {
-        self.windows.decoded()
     }
 
     /// A window of a joint in which every post holds a height, and how each stands.
@@ -140,7 +135,8 @@ impl WideMosaic {
             if cut.posts().all(|post| standings[window.index(post)] < Standing::Void) {
                 continue;
             }
-            let around = block.grown(reach).intersection(&joint.rect()).expect("a block lies in its raster");
+            let around =
+                block.grown(reach).intersection(&joint.header.frame.rect()).expect("a block lies in its raster");
             let (mut near, mut near_standings) = joint.read(&self.windows, around)?;
             let is_known = near.void_count() < around.post_count();
             for index in if is_known { near.fill_around(self.rules.voids.fill_within) } else { Vec::new() } {
@@ -176,10 +172,6 @@ fn joined(headers: &[&Header]) -> Result<(Header, Vec<[i32; 2]>), SourceError> {
 }
 
 impl Joint {
-    fn rect(&self) -> PostRect {
-        PostRect::of_size(self.header.frame.rows as usize, self.header.frame.cols as usize)
-    }
-
     /// The posts of a window, and how they stand where not all are heights.
     fn read(&self, windows: &Windows, window: PostRect) -> Result<(Raster, Vec<Standing>), SourceError> {
         if let [(file, _)] = self.members[..] {

@@ -55,7 +55,7 @@ pub fn encode_profile(stamp: &Stamp, profile: &Profile) -> Vec<u8> {
 ///
 /// # Errors
 /// When the file is not as it was written.
-pub fn decode_profile(path: &Path, bytes: &[u8]) -> Result<(Stamp, Profile), DatabaseError> {
+pub(crate) fn decode_profile(path: &Path, bytes: &[u8]) -> Result<(Stamp, Profile), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Profile, path, bytes)?;
     Ok((stamp, codec::decode(payload).map_err(|what| malformed(path, what))?))
 }

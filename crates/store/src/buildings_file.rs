@@ -34,7 +34,7 @@ struct BuildingOnDisk {
 }
 
 /// The bytes of the buildings of an area.
-pub fn encode_buildings(stamp: &Stamp, buildings: &[Building]) -> Vec<u8> {
+pub(crate) fn encode_buildings(stamp: &Stamp, buildings: &[Building]) -> Vec<u8> {
     let mut first = [0; 2];
     let to_disk = |Building { rings, bottom, top }: &Building| {
         let mut last = first;
@@ -51,7 +51,7 @@ pub fn encode_buildings(stamp: &Stamp, buildings: &[Building]) -> Vec<u8> {
 ///
 /// # Errors
 /// When the file is not as it was written.
-pub fn decode_buildings(path: &Path, bytes: &[u8]) -> Result<(Stamp, Vec<Building>), DatabaseError> {
+pub(crate) fn decode_buildings(path: &Path, bytes: &[u8]) -> Result<(Stamp, Vec<Building>), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Buildings, path, bytes)?;
     let on_disk: Vec<BuildingOnDisk> = codec::decode_small(payload).map_err(|what| malformed(path, what))?;
     let is_sound = |building: &BuildingOnDisk| {

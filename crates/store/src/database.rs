@@ -128,7 +128,7 @@ impl Database {
     ///
     /// # Errors
     /// When something cannot be removed.
-    pub fn remove_work(&self) -> Result<(), DatabaseError> {
+    pub(crate) fn remove_work(&self) -> Result<(), DatabaseError> {
         let path = self.folder.path(WORK);
         check_folder(&self.folder, &path)?;
         let store = self.folder.store();

@@ -53,7 +53,7 @@ impl Folder {
     }
 
     /// Where its files lie.
-    pub fn store(&self) -> &Arc<dyn Store> {
+    pub(crate) fn store(&self) -> &Arc<dyn Store> {
         &self.store
     }
 
@@ -73,7 +73,7 @@ impl Folder {
     }
 
     /// Where the list of removals of `tile` lies, in clip mode.
-    pub fn removals_path(&self, tile: TileId) -> PathBuf {
+    pub(crate) fn removals_path(&self, tile: TileId) -> PathBuf {
         self.path(&format!("{TILES}/{tile}.removed"))
     }
 

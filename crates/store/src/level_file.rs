@@ -217,7 +217,7 @@ pub fn encode_level(stamp: &Stamp, level: &AreaLevel) -> Vec<u8> {
 ///
 /// # Errors
 /// When the file is not as it was written.
-pub fn decode_level(path: &Path, bytes: &[u8]) -> Result<(Stamp, AreaLevel), DatabaseError> {
+pub(crate) fn decode_level(path: &Path, bytes: &[u8]) -> Result<(Stamp, AreaLevel), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Level, path, bytes)?;
     Ok((stamp, codec::decode(payload).map_err(|what| malformed(path, what))?))
 }

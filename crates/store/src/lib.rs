@@ -28,18 +28,20 @@ mod tile_file;
 pub use tile_file::{decode_tile, encode_tile};
 mod beside_tile;
 pub use beside_tile::{
-    Profile, Removals, decode_curve, decode_lines, decode_profile, decode_removals, encode_curve, encode_lines,
-    encode_profile, encode_removals,
+    Profile, Removals, decode_curve, decode_lines, decode_removals, encode_curve, encode_lines, encode_profile,
+    encode_removals,
 };
 mod level_file;
 pub use level_file::{
     AreaLevel, CULVERT, FeatureAmounts, FeatureEnd, FeatureFace, FeatureFarOff, FeatureLeftOut, FeatureLine,
-    FeatureRemark, FeatureWhy, StripFigures, decode_level, encode_level,
+    FeatureRemark, FeatureWhy, StripFigures, encode_level,
 };
 mod outlines_file;
-pub use outlines_file::{AreaOutlines, ModuleOutlines, ObjectLeftOut, decode_outlines, encode_outlines};
+pub(crate) use outlines_file::encode_outlines;
+pub use outlines_file::{AreaOutlines, ModuleOutlines, ObjectLeftOut};
 mod buildings_file;
-pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building, decode_buildings, encode_buildings};
+pub(crate) use buildings_file::encode_buildings;
+pub use buildings_file::{BUILDING_UNITS_PER_METRE, Building};
 mod measured_file;
 pub use measured_file::{
     Measured, MeasuredCurvature, MeasuredFeatures, MeasuredModule, MeasuredTally, decode_measured, encode_measured,
@@ -50,7 +52,7 @@ pub use load_module_reader::{
     VERSION as MODULES_FORMAT_VERSION, VERSION_OF_GROUND as MODULES_FORMAT_VERSION_OF_GROUND,
     VERSION_WITH_DECKS as MODULES_FORMAT_VERSION_WITH_DECKS,
 };
-pub use slm::{TileModules, decode_levels, decode_modules, encode_levels, encode_modules, load_module};
+pub use slm::{TileModules, decode_levels, encode_levels, encode_modules, load_module};
 mod json;
 mod page;
 pub use page::seal_page;

@@ -290,7 +290,7 @@ impl Manifest {
     ///
     /// # Errors
     /// Naming the first key in which the areas differ.
-    pub fn check_area(&self, path: &Path, area: &Area) -> Result<(), DatabaseError> {
+    pub(crate) fn check_area(&self, path: &Path, area: &Area) -> Result<(), DatabaseError> {
         match self.area.difference(area) {
             None => Ok(()),
             Some((key, found, expected)) => {

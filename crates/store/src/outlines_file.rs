@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use load_module_reader::{ObjectKind, Objects};
+use load_module_reader::Objects;
 use serde::{Deserialize, Serialize};
 use terrain::{ModuleGrid, ModuleId};
 
@@ -79,15 +79,10 @@ impl AreaOutlines {
         }
         counts
     }
-
-    /// The sums of a kind.
-    pub fn of_kind(&self, kind: ObjectKind) -> Option<&ObjectSums> {
-        self.kinds.iter().find(|sums| sums.kind == kind.name())
-    }
 }
 
 /// The bytes of what stands on the ground of an area.
-pub fn encode_outlines(stamp: &Stamp, outlines: &AreaOutlines) -> Vec<u8> {
+pub(crate) fn encode_outlines(stamp: &Stamp, outlines: &AreaOutlines) -> Vec<u8> {
     let AreaOutlines { side, modules, kinds, left_out, remarks, notes } = outlines;
     let module = |module: &ModuleOutlines| (module.row, module.col, module.objects.to_part());
     let on_disk = OutlinesOnDisk {
@@ -105,7 +100,7 @@ pub fn encode_outlines(stamp: &Stamp, outlines: &AreaOutlines) -> Vec<u8> {
 ///
 /// # Errors
 /// When the file is not as it was written.
-pub fn decode_outlines(path: &Path, bytes: &[u8]) -> Result<(Stamp, AreaOutlines), DatabaseError> {
+pub(crate) fn decode_outlines(path: &Path, bytes: &[u8]) -> Result<(Stamp, AreaOutlines), DatabaseError> {
     let (stamp, payload) = frame::open(Kind::Objects, path, bytes)?;
     let OutlinesOnDisk { side, modules, kinds, left_out, remarks, notes } =
         codec::decode(payload).map_err(|what| malformed(path, what))?;

@@ -278,7 +278,7 @@ fn put_checksum(file: &mut Vec<u8>, start: usize) {
 ///
 /// # Errors
 /// When the file is not as it was written, or a load module in it is not sound.
-pub fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
+pub(crate) fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
     let (tile, levels) = decode_levels(path, bytes)?;
     let finest = levels.into_iter().next().expect("the reader refuses a file without a level");
     Ok((tile, finest))

@@ -86,7 +86,7 @@ impl Work {
     }
 
     /// Whether the folder is there: it is swept away once the build is published.
-    pub fn is_there(&self) -> bool {
+    pub(crate) fn is_there(&self) -> bool {
         self.store.entry(&self.folder).is_ok()
     }
 
@@ -113,11 +113,6 @@ impl Work {
     fn share_path(&self, tile: TileId) -> PathBuf {
         self.folder.join(SHARES).join(format!("{tile}.json"))
     }
-
-    /// The folder itself.
-    pub fn path(&self) -> &Path {
-        &self.folder
-    }
 }
 
 #[cfg(test)]
@@ -142,7 +137,7 @@ mod tests {
         work.marks().unmark("refine-r00c01");
         assert_eq!(work.marks().marked("refine-r00c01"), None);
         database.remove_work().unwrap();
-        assert!(!work.path().exists() && work.read_share(samples::TILE).is_err());
+        assert!(!work.folder.exists() && work.read_share(samples::TILE).is_err());
     }
 
     #[test]
@@ -153,8 +148,8 @@ mod tests {
         let fingerprint = samples::stamp().fingerprint;
         (0..50).for_each(|unit| work.marks().mark(&format!("unit-{unit}"), fingerprint).unwrap());
         std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(|| work.sweep()))));
-        assert!(!work.path().exists() && other.path().exists());
+        assert!(!work.folder.exists() && other.folder.exists());
         other.sweep();
-        assert!(!other.path().parent().unwrap().exists());
+        assert!(!other.folder.parent().unwrap().exists());
     }
 }

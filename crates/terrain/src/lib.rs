@@ -6,9 +6,7 @@
 
 mod numbered;
 mod post;
-pub use post::{Post, PostRect};
-mod lattice;
-pub use lattice::{LATTICE_PER_POST, LatticePoint};
+pub use post::{LATTICE_PER_POST, LatticePoint, Post, PostRect};
 mod units;
 pub use units::{DEGREE_M, GridFrame, Metres, QUANTA_PER_METRE, Spacing, metres_of_quanta, quanta_of_metres};
 mod dem;

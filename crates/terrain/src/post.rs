@@ -1,4 +1,5 @@
-//! Posts of the working grid and rectangles of them.
+//! Posts of the working grid, rectangles of them, and the lattice on which every vertex of a TIN lies: eighths of a
+//! post, or finer steps where features need them.
 
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +161,40 @@ impl PostRect {
     }
 }
 
+/// Lattice steps between neighbouring posts, but for TINs with features (see [`crate::Tin::steps_per_post`]).
+pub const LATTICE_PER_POST: i32 = 8;
+
+/// A place on the working lattice, in eighths of a post from the area's south-west post.
+///
+/// Growing and the paper method use whole posts only; optimising moves free vertices to eighths. Features, and TINs
+/// with features, count in finer steps of their own, which they name; what turns places into posts here knows eighths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct LatticePoint {
+    /// Eighths of a post north of the area's southern edge.
+    pub row: i32,
+    /// Eighths of a post east of the area's western edge.
+    pub col: i32,
+}
+
+impl LatticePoint {
+    /// The lattice point at (row, col), in eighths of a post.
+    pub const fn new(row: i32, col: i32) -> Self {
+        Self { row, col }
+    }
+
+    /// The post at this place, if it lies on one.
+    pub fn post(self) -> Option<Post> {
+        let on_post = self.row % LATTICE_PER_POST == 0 && self.col % LATTICE_PER_POST == 0;
+        on_post.then(|| Post::new(self.row / LATTICE_PER_POST, self.col / LATTICE_PER_POST))
+    }
+}
+
+impl From<Post> for LatticePoint {
+    fn from(post: Post) -> Self {
+        Self { row: post.row * LATTICE_PER_POST, col: post.col * LATTICE_PER_POST }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,5 +215,12 @@ mod tests {
         let seam = west.intersection(&east).expect("they share column 4");
         assert_eq!((seam.posts_wide(), seam.posts_high()), (1, 5));
         assert_eq!(west.intersection(&PostRect::new(Post::new(0, 5), Post::new(1, 6))), None);
+    }
+
+    #[test]
+    fn a_post_survives_the_lattice_and_back() {
+        let post = Post::new(-3, 17);
+        assert_eq!(LatticePoint::from(post).post(), Some(post));
+        assert_eq!(LatticePoint::new(8, 9).post(), None);
     }
 }

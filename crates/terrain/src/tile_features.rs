@@ -122,11 +122,4 @@ impl TileFeatures {
     pub fn shaped_bodies(&self) -> impl Iterator<Item = &[FeatureSurface]> {
         self.shaped.chunk_by(FeatureSurface::is_of_one_body)
     }
-
-    /// Whether there is nothing that changes the ground or lies above it; lines do not.
-    pub fn is_empty(&self) -> bool {
-        let Self { tile: _, kept, surfaces, shaped, slopes, watersides, decks, lines: _ } = self;
-        let shapes_ground = !(shaped.is_empty() && slopes.is_empty() && watersides.is_empty());
-        kept.is_empty() && surfaces.is_empty() && !shapes_ground && decks.is_empty()
-    }
 }

@@ -89,7 +89,7 @@ impl Tin {
     }
 
     /// Doubled area of a triangle in squared lattice steps; positive when counter-clockwise.
-    pub fn doubled_area(&self, triangle: [u32; 3]) -> i64 {
+    pub(crate) fn doubled_area(&self, triangle: [u32; 3]) -> i64 {
         let [a, b, c] = triangle.map(|v| self.vertices[v as usize].at);
         i64::from(b.col - a.col) * i64::from(c.row - a.row) - i64::from(b.row - a.row) * i64::from(c.col - a.col)
     }

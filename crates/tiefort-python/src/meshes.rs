@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use source_files::{ArrayRaster, Crs, Raster};
-use terrain::{StopReason, metres_of_quanta};
+use terrain::metres_of_quanta;
 use tiefort::library::{self, Failure, SystemClock};
 
 use crate::arrays::{places, posts_of, residual_of, table};
@@ -137,12 +137,7 @@ impl Tin {
     /// Why it has no more vertices.
     #[getter]
     fn stop(&self) -> &'static str {
-        match self.mesh.stop {
-            StopReason::BudgetSpent => "all points are spent",
-            StopReason::ResidualReached => "the largest residual is reached",
-            StopReason::RmsReached => "the RMS residual is reached",
-            StopReason::Exhausted => "no post is left to choose",
-        }
+        library::end_in_words(self.mesh.stop)
     }
 
     /// Writes it as `tiefort tin --out` does.

@@ -16,6 +16,7 @@ use store::Report;
 use terrain::{ModuleId, TileId};
 
 pub use crate::clock::SystemClock;
+pub use crate::commands::tin::end_in_words;
 use crate::commands::{budgets, compare, correlate, explain, export, plan, tile, tin};
 pub use crate::failure::{Cause, Failure};
 use crate::{files, fit, resources};

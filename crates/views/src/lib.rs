@@ -15,12 +15,12 @@ pub use features_text::{far_off_in_words, remarks_in_words};
 mod certificate;
 mod page;
 pub use certificate::{Certificate, CertificateMap, CertificateSection, certificate_html, certificate_text};
-pub use page::{Advice, Page, PageSetting, advise, report_html};
+pub use page::{Page, PageSetting, report_html};
 mod picture;
 pub use picture::{
     Camera, Color, Cover, Drawn, Eye, Facets, Image, Look, Map, NO_RESIDUAL, Panel, RESIDUAL_SCALE_M, Scene,
     SceneFeatures, SceneGround, SceneLimits, SceneTile, SeenGround, Shown, Sight, Style, Surface, draw_errors,
-    draw_map, draw_module_limits, draw_panels, draw_perspective, draw_seen, draw_sight, draw_wireframe, palette,
+    draw_map, draw_module_limits, draw_panels, draw_seen, draw_sight, palette,
 };
 mod table;
 pub use table::{Align, COLUMNS_MAX, Table, fold, grouped};

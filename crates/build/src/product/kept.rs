@@ -5,7 +5,7 @@ use store::{MeasuredCurvature, MeasuredFeatures, MeasuredTally};
 use terrain::LatticePoint;
 
 /// What is kept of a tally.
-pub fn to_tally(tally: &Tally) -> MeasuredTally {
+pub(crate) fn to_tally(tally: &Tally) -> MeasuredTally {
     MeasuredTally {
         posts: tally.posts,
         sum: tally.sum,
@@ -17,7 +17,7 @@ pub fn to_tally(tally: &Tally) -> MeasuredTally {
 }
 
 /// The tally that was kept.
-pub fn from_tally(tally: &MeasuredTally) -> Tally {
+pub(crate) fn from_tally(tally: &MeasuredTally) -> Tally {
     let [high, low] = tally.sum_squared.map(u128::from);
     let mut sums = Tally::default().with_bins(tally.bins.iter().copied());
     (sums.posts, sums.sum, sums.sum_abs) = (tally.posts, tally.sum, tally.sum_abs);
@@ -26,17 +26,17 @@ pub fn from_tally(tally: &MeasuredTally) -> Tally {
 }
 
 /// What is kept of how much the ground curves.
-pub fn to_curvature(Curvature { cells, integral, rough_cells }: Curvature) -> MeasuredCurvature {
+pub(crate) fn to_curvature(Curvature { cells, integral, rough_cells }: Curvature) -> MeasuredCurvature {
     MeasuredCurvature { cells, integral, rough_cells }
 }
 
 /// How much the ground curves, as it was kept.
-pub fn from_curvature(MeasuredCurvature { cells, integral, rough_cells }: MeasuredCurvature) -> Curvature {
+pub(crate) fn from_curvature(MeasuredCurvature { cells, integral, rough_cells }: MeasuredCurvature) -> Curvature {
     Curvature { cells, integral, rough_cells }
 }
 
 /// What is kept of the figures of features.
-pub fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
+pub(crate) fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
     let FeatureFigures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = figures;
     let FeatureFigures { lake_banks_m2, outside, decks, .. } = figures;
     MeasuredFeatures {

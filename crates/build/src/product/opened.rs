@@ -56,7 +56,6 @@ impl Opened {
 /// Heights of a finished database's ground.
 pub struct BuiltFrom {
     ground: Ground,
-    name: String,
 }
 
 impl BuiltFrom {
@@ -68,14 +67,9 @@ impl BuiltFrom {
         let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
         // Nothing that is compared with heights depends on weights.
         job.importance.areas.clear();
-        let name = choose_ground(&mut job, &manifest, folder.dir(), against)?;
+        choose_ground(&mut job, &manifest, folder.dir(), against)?;
         let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
-        Ok(Self { ground, name })
-    }
-
-    /// What it is: the sample terrain, or the rasters.
-    pub fn name(&self) -> &str {
-        &self.name
+        Ok(Self { ground })
     }
 
     /// Heights at the posts of a rectangle of the area.

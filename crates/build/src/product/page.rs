@@ -19,7 +19,7 @@ pub fn page(product: &Product, report: &Report, workers: usize) -> String {
 }
 
 /// The page of a database whose load modules are too many to be drawn.
-pub fn page_without_maps(opened: &Opened, report: &Report) -> String {
+pub(crate) fn page_without_maps(opened: &Opened, report: &Report) -> String {
     drawn(&opened.job, &opened.manifest, report, None, &Workers::new(1))
 }
 
@@ -49,7 +49,7 @@ pub fn features_file(job: &Job, remarks: &[FeatureRemark]) -> (&'static str, Str
 }
 
 /// Name and text of the file that lists which objects of this job had no room, and what was mended.
-pub fn objects_file(job: &Job, outlines: &AreaOutlines) -> (&'static str, String) {
+pub(crate) fn objects_file(job: &Job, outlines: &AreaOutlines) -> (&'static str, String) {
     let left_out = |object: &ObjectLeftOut| {
         let ObjectLeftOut { kind, at_m, height_m, silhouette_m2, full } = object;
         let place = match full {

@@ -34,7 +34,7 @@ pub enum Told {
 
 /// One thing that a build knows.
 #[derive(Clone, Copy)]
-pub struct Matter {
+pub(crate) struct Matter {
     /// What it is.
     pub what: &'static str,
     /// What becomes of it.
@@ -44,7 +44,7 @@ pub struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub const MATTERS: [Matter; 18] = [
+pub(crate) const MATTERS: [Matter; 18] = [
     matter(
         "files, datums, holes and rules of sources that are not as they should be",
         Told::OfStage,
@@ -172,7 +172,7 @@ fn through_hills(made: &Made) -> Vec<String> {
 const LEFT_OUT_MAX: [f64; 2] = [0.01, 0.1];
 
 /// Whether limits leave out so much of the features that it is a warning.
-pub fn leaves_much_out(job: &Job, level: &AreaLevel) -> bool {
+pub(crate) fn leaves_much_out(job: &Job, level: &AreaLevel) -> bool {
     !left_out_of(job, level).is_empty()
 }
 

@@ -171,16 +171,8 @@ pub(crate) fn untiled_together(
     stop: &AtomicBool,
 ) -> Result<Option<Tally>, CompileError> {
     let request = |triangles: usize| TinRequest {
-        dem: PathBuf::new(),
-        crs: None,
-        method: TinMethod::Optimised(Optimising::default()),
-        points: None,
         triangles: Some(triangles),
-        max_residual_m: None,
-        rms_m: None,
-        start: None,
-        tiles: None,
-        workers: 1,
+        ..TinRequest::plain(PathBuf::new(), TinMethod::Optimised(Optimising::default()))
     };
     // Two are there before any point, and a point makes two more.
     let points = triangles.saturating_sub(2 * grounds.len()) / 2;

@@ -56,6 +56,24 @@ pub struct TinRequest {
     pub workers: usize,
 }
 
+impl TinRequest {
+    /// A mesh of a raster by a method, on one worker: nothing else is asked for, not even when it is to stop.
+    pub fn plain(dem: PathBuf, method: TinMethod) -> Self {
+        Self {
+            dem,
+            crs: None,
+            method,
+            points: None,
+            triangles: None,
+            max_residual_m: None,
+            rms_m: None,
+            start: None,
+            tiles: None,
+            workers: 1,
+        }
+    }
+}
+
 /// Refuses a mesh of so many rows and columns of tiles that a raster has no room for.
 pub(crate) fn refuse(request: &TinRequest, (rows, cols): (u32, u32), rect: PostRect) -> Result<(), CompileError> {
     let longest =

@@ -94,18 +94,7 @@ fn equivalent_points_are_the_fewest_whose_iterative_tin_is_better() {
             panic!("{}: {:?}", row.method.name(), made.equivalent)
         };
         let iterative = |points: usize| {
-            let request = TinRequest {
-                dem: path.clone(),
-                crs: None,
-                method: TinMethod::Paper,
-                points: Some(points),
-                triangles: None,
-                max_residual_m: None,
-                rms_m: None,
-                start: None,
-                tiles: None,
-                workers: 1,
-            };
+            let request = TinRequest { points: Some(points), ..TinRequest::plain(path.clone(), TinMethod::Paper) };
             build::workbench::tin(&request, &AtomicBool::new(false), &mut Silent).unwrap().residual.rms_m
         };
         let theirs = made.residual.rms_m();

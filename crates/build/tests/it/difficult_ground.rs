@@ -115,16 +115,10 @@ fn a_mesh_of_more_points_than_posts_is_every_post() {
         let optimised = TinMethod::Optimised(Optimising::default());
         for method in [TinMethod::Greedy { key: ErrorKey::Max }, TinMethod::Paper, optimised] {
             let request = TinRequest {
-                dem: path.clone(),
-                crs: None,
-                method,
                 points: Some(10_000),
-                triangles: None,
-                max_residual_m: None,
-                rms_m: None,
-                start: None,
                 tiles: Some(tiles),
                 workers: 2,
+                ..TinRequest::plain(path.clone(), method)
             };
             let mesh = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap();
             mesh.tin.check().unwrap();
@@ -236,18 +230,8 @@ fn voids_of_a_mesh_are_no_vertices_and_in_no_statistic() {
     write_dem(&path, &holed);
     for tiles in [(1, 1), (2, 3)] {
         let method = TinMethod::Greedy { key: ErrorKey::Sse };
-        let request = TinRequest {
-            dem: path.clone(),
-            crs: None,
-            method,
-            points: Some(400),
-            triangles: None,
-            max_residual_m: None,
-            rms_m: None,
-            start: None,
-            tiles: Some(tiles),
-            workers: 2,
-        };
+        let request =
+            TinRequest { points: Some(400), tiles: Some(tiles), workers: 2, ..TinRequest::plain(path.clone(), method) };
         let mesh = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap();
         // Whole but for the voids, over which there is no ground; in doubled squares of steps between posts.
         let Err(TinFault::AreaMissing(found, whole)) = mesh.tin.check() else { panic!("voids are covered") };
@@ -280,16 +264,9 @@ fn beside_voids_no_vertex_of_a_mesh_stands_outside_the_ground() {
         let residual_of = |dem: &Dem| {
             write_dem(&path, dem);
             let request = TinRequest {
-                dem: path.clone(),
-                crs: None,
-                method: TinMethod::Optimised(Optimising { effort, ..Optimising::default() }),
-                points: None,
                 triangles: Some(500),
-                max_residual_m: None,
-                rms_m: None,
-                start: None,
-                tiles: None,
                 workers: 2,
+                ..TinRequest::plain(path.clone(), TinMethod::Optimised(Optimising { effort, ..Optimising::default() }))
             };
             let mesh = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap();
             let mut heights = mesh.tin.vertices.iter().map(|vertex| f64::from(vertex.height) / 128.0);
@@ -310,16 +287,9 @@ fn a_raster_that_no_mesh_has_room_for_is_refused_before_its_heights_are_read() {
     // None of them is a height, which nothing tells before they are read.
     write_dem(&path, &Dem::from_fn(PostRect::of_size(3, 17_000), |_| None));
     let request = TinRequest {
-        dem: path,
-        crs: None,
-        method: TinMethod::Greedy { key: ErrorKey::Sse },
         points: Some(400),
-        triangles: None,
-        max_residual_m: None,
-        rms_m: None,
-        start: None,
-        tiles: None,
         workers: 2,
+        ..TinRequest::plain(path, TinMethod::Greedy { key: ErrorKey::Sse })
     };
     let of_one = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap_err().to_string();
     assert!(of_one.contains("tiles of 16999 cells, expected tiles below 16384 cells a side"), "{of_one}");

@@ -122,18 +122,8 @@ fn a_mesh_from_a_raster_is_that_of_the_method_and_tiles_cost_little() {
     let path = folder.path().join("window.tif");
     write_dem(&path, &dem);
     let mesh = |method, tiles, workers| {
-        let request = TinRequest {
-            dem: path.clone(),
-            crs: None,
-            method,
-            points: Some(5000),
-            triangles: None,
-            max_residual_m: None,
-            rms_m: None,
-            start: None,
-            tiles: Some(tiles),
-            workers,
-        };
+        let request =
+            TinRequest { points: Some(5000), tiles: Some(tiles), workers, ..TinRequest::plain(path.clone(), method) };
         let mesh = build::workbench::tin(&request, &false.into(), &mut Silent).unwrap();
         mesh.tin.check().unwrap();
         let sums = sums_of_tin(&mesh.tin, &dem);

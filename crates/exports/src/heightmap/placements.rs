@@ -23,7 +23,7 @@ pub enum Engine {
 
 impl Engine {
     /// The sides of a tile that the engine takes, in samples.
-    pub fn sizes(self) -> &'static [usize] {
+    pub(crate) fn sizes(self) -> &'static [usize] {
         match self {
             Engine::Unreal => &[127, 253, 505, 1009, 2017, 4033, 8129],
             Engine::Unity => &[33, 65, 129, 257, 513, 1025, 2049, 4097],

@@ -112,7 +112,7 @@ impl<P: Borrow<Product>> QuantizedMesh<P> {
     }
 
     /// What was done to heights.
-    pub fn datum(&self) -> Datum {
+    pub(crate) fn datum(&self) -> Datum {
         self.earth.datum()
     }
 

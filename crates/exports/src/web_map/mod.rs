@@ -34,7 +34,7 @@ pub struct WebMap {
 
 impl WebMap {
     /// The sides of a tile that maps take, in pixels.
-    pub const SIZES: [usize; 2] = [256, 512];
+    pub(crate) const SIZES: [usize; 2] = [256, 512];
 }
 
 /// Writes the tiles as MBTiles 1.3 at `path`.
@@ -286,7 +286,7 @@ pub enum HeightEncoding {
 
 impl HeightEncoding {
     /// What programs call it.
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Mapbox => "mapbox",
             Self::Terrarium => "terrarium",

@@ -32,7 +32,7 @@ pub struct Plan {
 impl Demand {
     /// The smallest plan that keeps the risk, and with which two surfaces of which half as much fails are refused with
     /// no larger one. `None` where that takes more than [`SAMPLES_MAX`].
-    pub fn plan(&self) -> Option<Plan> {
+    pub(crate) fn plan(&self) -> Option<Plan> {
         let failing = 1.0 - self.share;
         let mut samples = 1;
         let mut failures_max = 0;
@@ -46,7 +46,7 @@ impl Demand {
     }
 
     /// The most failures of so many places with which the risk is kept; `None` where not even none keeps it.
-    pub fn failures_max(&self, samples: u64) -> Option<u64> {
+    pub(crate) fn failures_max(&self, samples: u64) -> Option<u64> {
         let keeps = |failures| at_most(failures, samples, 1.0 - self.share) <= self.risk;
         if !keeps(0) {
             return None;
@@ -60,7 +60,7 @@ impl Demand {
     }
 
     /// The fewest places of which none may fail.
-    pub fn samples_min(&self) -> Option<u64> {
+    pub(crate) fn samples_min(&self) -> Option<u64> {
         least(1, |samples| at_most(0, samples, 1.0 - self.share) <= self.risk)
     }
 }

@@ -26,7 +26,7 @@ impl Crs {
     ///
     /// # Errors
     /// In words, what is wrong with it.
-    pub fn from_wkt(text: &str) -> Result<Self, String> {
+    pub(crate) fn from_wkt(text: &str) -> Result<Self, String> {
         wkt::read(text)
     }
 

@@ -24,12 +24,12 @@ impl Extent {
         Self { east: [f64::INFINITY, f64::NEG_INFINITY], north: [f64::INFINITY, f64::NEG_INFINITY] };
 
     /// The rectangle with `by` more on each side.
-    pub fn grown(&self, by: f64) -> Self {
+    pub(crate) fn grown(&self, by: f64) -> Self {
         Self { east: [self.east[0] - by, self.east[1] + by], north: [self.north[0] - by, self.north[1] + by] }
     }
 
     /// Whether nothing lies in it.
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         !(self.east[0] <= self.east[1] && self.north[0] <= self.north[1])
     }
 

@@ -10,7 +10,7 @@ use crate::SourceError;
 use crate::crs::Crs;
 use crate::limits::RINGS_MAX;
 use crate::shapefile::{self, Shape};
-use crate::shapefile_parts::{Parts, whole};
+use crate::shapefile::{Parts, whole};
 use crate::store::Store;
 
 pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {

@@ -295,7 +295,8 @@ impl Keep {
     }
 
     /// How often a strip or tile was decoded.
-    pub fn decoded(&self) -> u64 {
+    #[cfg(test)]
+    pub(crate) fn decoded(&self) -> u64 {
         self.0.decoded()
     }
 

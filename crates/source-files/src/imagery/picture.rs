@@ -64,7 +64,8 @@ impl Imagery {
     }
 
     /// Pixels across and down, of the picture and of each overview.
-    pub fn sizes(&self) -> Vec<[u32; 2]> {
+    #[cfg(test)]
+    pub(crate) fn sizes(&self) -> Vec<[u32; 2]> {
         self.levels.iter().map(|level| [level.cols, level.rows]).collect()
     }
 

@@ -10,16 +10,14 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::parser::parse_message_type;
 use source_files::{
-    Extent, FeatureFile, GeoParquet, SourceError, VectorShape, Wanted, groups_near, is_feature_file, read_features,
+    FeatureFile, GeoParquet, SourceError, VectorShape, Wanted, groups_near, is_feature_file, read_features,
 };
 use terrain::in_turn;
 
-use crate::support::Folder;
+use crate::support::{self, Folder};
 
-/// Ten kilometres a side in UTM zone 11, about -117.05 to -116.95 and 34.95 to 35.05.
-const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-const WANTED: Wanted =
-    Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &[], buildings: false, points: false };
+/// About -117.05 to -116.95 degrees east and 34.95 to 35.05 degrees north.
+const WANTED: Wanted = Wanted { keys: &[], ..support::WANTED };
 /// Columns of Overture's segments, with one in the place of `sources`.
 const SEGMENTS: &str = "message schema { optional binary id (UTF8); optional binary geometry; required group bbox { \
     required float xmin; required float xmax; required float ymin; required float ymax; } required int32 version; \

@@ -1,28 +1,11 @@
 //! OpenStreetMap data: what is read, how it is put together, and what is told of what is not.
 
 use proptest::prelude::*;
-use source_files::{
-    BUILT_IN_KEYS, Crs, Extent, FeatureFile, SourceError, VectorFeature, VectorShape, Wanted, read_features,
-};
+use source_files::{Crs, FeatureFile, SourceError, VectorFeature, VectorShape, Wanted, read_features};
 use terrain::in_turn;
 
 use crate::pbf::{Osm, Packing, bytes, frame, header, number, with_head};
-use crate::support::Folder;
-
-/// Ten kilometres a side round 117 W, 35 N, in UTM zone 11.
-const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-
-const WANTED: Wanted = Wanted {
-    epsg: 32611,
-    bounds: BOUNDS,
-    layer: None,
-    crs: None,
-    keys: &BUILT_IN_KEYS,
-    buildings: false,
-    points: false,
-};
-const ROAD: &[(&str, &str)] = &[("highway", "primary")];
-const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
+use crate::support::{BOUNDS, Folder, LAKE, ROAD, WANTED, ids, remarks};
 
 fn read_bytes(bytes: &[u8]) -> Result<FeatureFile, SourceError> {
     let folder = Folder::new();
@@ -38,14 +21,6 @@ fn read(osm: &Osm) -> FeatureFile {
 fn grid() -> Osm {
     let node = |id: i64| (id, [-117.0 + 0.001 * (id % 10) as f64, 35.0 + 0.001 * (id / 10) as f64]);
     Osm::new(&(1..100).filter(|id| id % 10 != 0).map(node).collect::<Vec<_>>())
-}
-
-fn ids(file: &FeatureFile) -> Vec<&str> {
-    file.features.iter().map(|feature| feature.id.as_str()).collect()
-}
-
-fn remarks(file: &FeatureFile) -> Vec<String> {
-    file.remarks.iter().map(|remark| format!("{}: {} ({})", remark.id, remark.found, remark.done)).collect()
 }
 
 fn line(feature: &VectorFeature) -> &[[f64; 2]] {

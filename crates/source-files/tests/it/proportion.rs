@@ -6,24 +6,13 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use source_files::{BUILT_IN_KEYS, Extent, SourceError, Wanted, read_features, read_polygons};
+use source_files::{SourceError, Wanted, read_features, read_polygons};
 use terrain::in_turn;
 
 use crate::pbf::{Osm, bytes, frame, header, number};
-use crate::support::Folder;
+use crate::support::{self, Folder, LAKE, ROAD};
 
-const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-const WANTED: Wanted = Wanted {
-    epsg: 32611,
-    bounds: BOUNDS,
-    layer: None,
-    crs: None,
-    keys: &BUILT_IN_KEYS,
-    buildings: true,
-    points: false,
-};
-const ROAD: &[(&str, &str)] = &[("highway", "primary")];
-const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
+const WANTED: Wanted = Wanted { buildings: true, ..support::WANTED };
 
 fn refusal(path: &Path) -> SourceError {
     read_features(path, &WANTED, &in_turn).expect_err("it is refused")

@@ -1,10 +1,34 @@
-//! Makes small TIFF files, tag by tag, so that any of them can be wrong.
+//! Makes small TIFF files, tag by tag, so that any of them can be wrong; what is wanted of features, and what is told
+//! of them.
 
 use std::path::{Path, PathBuf};
 
-use source_files::{GeoTiff, Raster, SourceError};
+use source_files::{BUILT_IN_KEYS, Extent, FeatureFile, GeoTiff, Raster, SourceError, Wanted};
 use tempfile::TempDir;
 use terrain::{GridFrame, Spacing};
+
+/// Ten kilometres a side round 117 W, 35 N, in UTM zone 11.
+pub const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
+/// Lines and polygons there, with the tags that the built-in table asks for.
+pub const WANTED: Wanted = Wanted {
+    epsg: 32611,
+    bounds: BOUNDS,
+    layer: None,
+    crs: None,
+    keys: &BUILT_IN_KEYS,
+    buildings: false,
+    points: false,
+};
+pub const ROAD: &[(&str, &str)] = &[("highway", "primary")];
+pub const LAKE: &[(&str, &str)] = &[("natural", "water"), ("type", "multipolygon")];
+
+pub fn ids(file: &FeatureFile) -> Vec<&str> {
+    file.features.iter().map(|feature| feature.id.as_str()).collect()
+}
+
+pub fn remarks(file: &FeatureFile) -> Vec<String> {
+    file.remarks.iter().map(|remark| format!("{}: {} ({})", remark.id, remark.found, remark.done)).collect()
+}
 
 /// A folder that is gone when the test is.
 pub struct Folder(TempDir);

@@ -3,30 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use source_files::{
-    DemFile, Extent, FeatureFile, Reading, SourceError, VectorFeature, VectorShape, Wanted, feature_layers,
-    is_feature_file, read_features,
+    DemFile, FeatureFile, Reading, SourceError, VectorFeature, VectorShape, Wanted, feature_layers, is_feature_file,
+    read_features,
 };
 use terrain::in_turn;
 
 use crate::pbf::header;
-use crate::support::{Folder, Tiff};
+use crate::support::{self, Folder, Tiff, ids, remarks};
 
-/// Ten kilometres a side in UTM zone 11.
-const BOUNDS: Extent = Extent { east: [495_000.0, 505_000.0], north: [3_868_000.0, 3_878_000.0] };
-const WANTED: Wanted =
-    Wanted { epsg: 32611, bounds: BOUNDS, layer: None, crs: None, keys: &[], buildings: false, points: false };
+const WANTED: Wanted = Wanted { keys: &[], ..support::WANTED };
 
 #[track_caller]
 fn read(path: &Path) -> FeatureFile {
     read_features(path, &WANTED, &in_turn).unwrap()
-}
-
-fn ids(file: &FeatureFile) -> Vec<&str> {
-    file.features.iter().map(|feature| feature.id.as_str()).collect()
-}
-
-fn remarks(file: &FeatureFile) -> Vec<String> {
-    file.remarks.iter().map(|remark| format!("{}: {} ({})", remark.id, remark.found, remark.done)).collect()
 }
 
 fn tags(feature: &VectorFeature) -> Vec<(&str, &str)> {

@@ -101,11 +101,6 @@ impl World {
         self.state().count
     }
 
-    /// A number below `end` that the seed gives, for setting a run up.
-    pub fn choose(&self, end: usize) -> usize {
-        self.state().random.usize(..end)
-    }
-
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -31,7 +31,7 @@ impl Fingerprint {
     }
 
     /// The fingerprint of 64 hexadecimal digits; `None` when it is anything else.
-    pub fn from_hex(text: &str) -> Option<Self> {
+    pub(crate) fn from_hex(text: &str) -> Option<Self> {
         let lower = text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
         let hash = blake3::Hash::from_hex(text).ok()?;
         lower.then_some(Self(*hash.as_bytes()))

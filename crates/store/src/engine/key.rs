@@ -74,7 +74,7 @@ impl Key {
     }
 
     /// What changed since parts were written down, in the order of the key.
-    pub fn changed_since(&self, before: &Parts) -> Vec<&'static str> {
+    pub(crate) fn changed_since(&self, before: &Parts) -> Vec<&'static str> {
         let differs = |(part, now): &&(Part, Fingerprint)| before.get(part.name) != Some(&brief(*now));
         self.parts.iter().filter(differs).map(|(part, _)| part.changed).collect()
     }

@@ -58,7 +58,7 @@ pub struct Lease {
 
 impl Leases {
     /// The leases in `folder` for the process that calls itself `holder`, a name that no other process has.
-    pub fn new(store: Arc<dyn Store>, folder: PathBuf, holder: &str, expiry: Duration) -> Self {
+    pub(crate) fn new(store: Arc<dyn Store>, folder: PathBuf, holder: &str, expiry: Duration) -> Self {
         Self { store, folder, holder: holder.to_owned(), expiry, seen: BTreeMap::new() }
     }
 
@@ -135,7 +135,7 @@ pub struct Marks {
 
 impl Marks {
     /// The marks in a folder.
-    pub fn new(store: Arc<dyn Store>, folder: PathBuf) -> Self {
+    pub(crate) fn new(store: Arc<dyn Store>, folder: PathBuf) -> Self {
         Self { store, folder }
     }
 

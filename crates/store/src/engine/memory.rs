@@ -59,7 +59,7 @@ impl Memory {
     /// The computer loses its power: `choose` says of each file that was not synced what is found afterwards, as a
     /// number below the one it is given: 0 what was written, 1 what the disk had before, 2 the beginning of what was
     /// written, 3 as many zeros.
-    pub fn lose_power(&self, mut choose: impl FnMut(usize) -> usize) {
+    pub(crate) fn lose_power(&self, mut choose: impl FnMut(usize) -> usize) {
         let mut files = self.files();
         let mut found = BTreeMap::new();
         for (path, node) in &files.nodes {

@@ -9,7 +9,8 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod store;
-pub use store::{Clock, Durability, Entry, Guard, Held, LockKind, Store, StoreError, is_temporary, remove_all};
+pub(crate) use store::remove_all;
+pub use store::{Clock, Durability, Entry, Guard, Held, LockKind, Store, StoreError, is_temporary};
 mod disk;
 pub use disk::{Disk, Writing, check_writable};
 mod memory;

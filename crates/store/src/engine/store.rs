@@ -152,7 +152,7 @@ pub trait Store: fmt::Debug + Send + Sync {
 ///
 /// # Errors
 /// When something cannot be removed.
-pub fn remove_all(store: &dyn Store, folder: &Path) -> io::Result<()> {
+pub(crate) fn remove_all(store: &dyn Store, folder: &Path) -> io::Result<()> {
     for path in store.list(folder)? {
         let removed = match store.entry(&path) {
             Ok(Entry::Folder) => remove_all(store, &path),

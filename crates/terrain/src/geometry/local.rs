@@ -52,7 +52,7 @@ impl LocalPost {
     /// Exact in 64 bits for tiles of at most [`crate::geometry::WORKING_POSTS_MAX`] posts a side: squared distances
     /// stay below 2^29, cross products below 2^29, so the three terms sum to less than 2^60.
     #[inline(always)]
-    pub fn in_circle(corners: &[Self; 3], p: Self, apex: Self) -> bool {
+    pub(crate) fn in_circle(corners: &[Self; 3], p: Self, apex: Self) -> bool {
         let relative = |q: Self| {
             let (x, y) = (i64::from(q.col() - p.col()), i64::from(q.row() - p.row()));
             (x, y, x * x + y * y)
@@ -90,14 +90,6 @@ pub struct LocalRect {
     pub north: i32,
     /// Last column.
     pub east: i32,
-}
-
-impl LocalRect {
-    /// Whether `post` lies inside.
-    #[inline(always)]
-    pub fn contains(&self, post: LocalPost) -> bool {
-        self.south <= post.row() && post.row() <= self.north && self.west <= post.col() && post.col() <= self.east
-    }
 }
 
 #[cfg(test)]

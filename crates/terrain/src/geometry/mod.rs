@@ -8,7 +8,8 @@ pub mod owned;
 pub mod resample;
 
 mod predicates;
-pub use predicates::{Canonical, in_circle, in_circle_canonical, orient};
+pub(crate) use predicates::in_circle_canonical;
+pub use predicates::{Canonical, in_circle, orient};
 mod local;
 pub use local::{LocalPost, LocalRect};
 mod facet;

@@ -51,7 +51,7 @@ pub fn in_circle<P: Canonical>(a: P, b: P, c: P, p: P) -> i128 {
 ///
 /// Four co-circular points keep the diagonal that contains the smallest of them; that is a consistent
 /// perturbation, so the triangulation depends on the set of points only.
-pub fn in_circle_canonical<P: Canonical>(a: P, b: P, c: P, p: P) -> bool {
+pub(crate) fn in_circle_canonical<P: Canonical>(a: P, b: P, c: P, p: P) -> bool {
     match in_circle(a, b, c, p) {
         0 => {
             let smallest = a.min(b).min(c).min(p);

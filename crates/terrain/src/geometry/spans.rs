@@ -68,7 +68,7 @@ pub struct Spans {
 impl Spans {
     /// The rows of `facet`.
     #[inline(always)]
-    pub fn new(facet: &Facet) -> Self {
+    pub(crate) fn new(facet: &Facet) -> Self {
         let mut corners = [0, 1, 2].map(|i| (facet.y[i], facet.x[i]));
         if corners[1].0 < corners[0].0 {
             corners.swap(0, 1);

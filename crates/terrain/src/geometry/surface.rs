@@ -39,7 +39,7 @@ impl<'a> Surface<'a> {
 
     /// Where candidates may lie.
     #[inline(always)]
-    pub fn candidates(&self) -> LocalRect {
+    pub(crate) fn candidates(&self) -> LocalRect {
         self.candidates
     }
 
@@ -51,7 +51,7 @@ impl<'a> Surface<'a> {
 
     /// Highest minus lowest height, in quanta.
     #[inline(always)]
-    pub fn relief(&self) -> i64 {
+    pub(crate) fn relief(&self) -> i64 {
         self.relief
     }
 

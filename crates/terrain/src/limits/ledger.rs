@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::limits::{Charged, ModuleLines};
 use crate::{ModuleId, ModuleRect, POINT_COST, RefusedBy};
 
 /// Triangles one tile may add to its start, by load module, by window and in all.
@@ -50,7 +51,7 @@ struct Account {
 
 impl Ledger {
     /// A ledger from which nothing has been spent.
-    pub fn new(allowance: Allowance) -> Self {
+    pub(crate) fn new(allowance: Allowance) -> Self {
         assert_eq!(allowance.module_room.len(), allowance.modules.count(), "one room per load module");
         assert_eq!(allowance.window_room.len(), allowance.windows.count(), "one room per window");
         let count = allowance.module_room.len();
@@ -69,13 +70,13 @@ impl Ledger {
     }
 
     /// Triangles `module` may still gain.
-    pub fn room_of(&self, module: ModuleId) -> u32 {
+    pub(crate) fn room_of(&self, module: ModuleId) -> u32 {
         let index = self.module_index(module);
         self.allowance.module_room[index].saturating_sub(self.modules[index].spent)
     }
 
     /// Whether `module`, or a window that holds it, has more than it may.
-    pub fn is_over(&self, module: ModuleId) -> bool {
+    pub(crate) fn is_over(&self, module: ModuleId) -> bool {
         let index = self.module_index(module);
         self.allowance.module_room[index] < self.modules[index].spent || self.least_left(module) < 0
     }
@@ -129,7 +130,7 @@ impl Ledger {
     ///
     /// A point costs two triangles wherever it lies, and a window may hold both load modules beside a side
     /// point, so windows are asked for two. One that has room for a single triangle stays as it is.
-    pub fn refuses(&self, module: ModuleId, cost: u32, beyond_tile: bool) -> Option<RefusedBy> {
+    pub(crate) fn refuses(&self, module: ModuleId, cost: u32, beyond_tile: bool) -> Option<RefusedBy> {
         if self.room_of(module) < cost {
             return Some(if beyond_tile { RefusedBy::Reservation } else { RefusedBy::Module });
         }
@@ -145,7 +146,7 @@ impl Ledger {
     }
 
     /// Looks at the windows of every load module again, so that many points are judged fast.
-    pub fn look_again(&mut self) {
+    pub(crate) fn look_again(&mut self) {
         for (index, module) in self.allowance.modules.iter().enumerate() {
             let (left, booked) = (self.least_left(module), self.booked);
             self.modules[index] = Account { left, booked, ..self.modules[index] };
@@ -156,7 +157,7 @@ impl Ledger {
     ///
     /// # Panics
     /// When a limit refuses them: the caller asks first.
-    pub fn charge(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn charge(&mut self, module: ModuleId, cost: u32) {
         self.book(module, cost);
         let index = self.module_index(module);
         let Account { spent, left, .. } = self.modules[index];
@@ -166,7 +167,7 @@ impl Ledger {
     }
 
     /// Notes `cost` triangles that `module` has already, whether or not it may.
-    pub fn book(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn book(&mut self, module: ModuleId, cost: u32) {
         let mut least = i32::MAX;
         for row in self.window_rows(module) {
             for left in &mut self.left[row] {
@@ -191,7 +192,7 @@ impl Ledger {
     ///
     /// # Panics
     /// When there are not so many.
-    pub fn refund(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn refund(&mut self, module: ModuleId, cost: u32) {
         let take = |count: &mut u32| *count = count.checked_sub(cost).expect("only what was booked is refunded");
         let index = self.module_index(module);
         take(&mut self.modules[index].spent);
@@ -204,7 +205,7 @@ impl Ledger {
     /// Takes room in `module` for points a neighbour has chosen and paid for.
     ///
     /// Reservations keep this room free; what they could not foresee (pins) ends at zero.
-    pub fn inherit(&mut self, module: ModuleId, cost: u32) {
+    pub(crate) fn inherit(&mut self, module: ModuleId, cost: u32) {
         let index = self.module_index(module);
         let room = &mut self.allowance.module_room[index];
         *room = room.saturating_sub(cost);
@@ -233,11 +234,114 @@ pub enum ShortOf {
     Tile,
 }
 
+/// What a tile spends on points, by where they stand.
+#[derive(Clone, Debug)]
+pub struct TileLedger {
+    lines: ModuleLines,
+    ledger: Ledger,
+}
+
+impl TileLedger {
+    /// A ledger from which nothing has been spent.
+    pub fn new(lines: ModuleLines, allowance: Allowance) -> Self {
+        Self { lines, ledger: Ledger::new(allowance) }
+    }
+
+    /// The same ledger for places measured in steps of which `per_step` make one of today's.
+    pub fn in_finer_steps(mut self, per_step: i32) -> Self {
+        self.lines.side *= per_step;
+        self
+    }
+
+    /// The load module and the limit that refuse a point, if any do. The tile's total is not asked.
+    pub fn refuses(&self, row: i32, col: i32) -> Option<(ModuleId, RefusedBy)> {
+        let ask = |module, cost| {
+            let by = self.ledger.refuses(module, cost, !self.lines.contain(module));
+            by.map(|by| (module, by))
+        };
+        match self.lines.charged(row, col)? {
+            Charged::Inside(module) => ask(module, POINT_COST),
+            Charged::Between(first, second) => ask(first, 1).or_else(|| ask(second, 1)),
+            Charged::Beside(module) => ask(module, 1),
+        }
+    }
+
+    /// Makes ready to judge many points fast.
+    pub fn look_again(&mut self) {
+        self.ledger.look_again();
+    }
+
+    /// Spends what a point costs.
+    ///
+    /// # Panics
+    /// When a limit refuses it: the caller asks first.
+    pub fn charge(&mut self, row: i32, col: i32) {
+        self.each_charge(row, col, Ledger::charge);
+    }
+
+    /// Notes a point that is there already, whether or not it may be.
+    pub fn book(&mut self, row: i32, col: i32) {
+        self.each_charge(row, col, Ledger::book);
+    }
+
+    /// Notes all points that are there already, by row and column, whether or not they may be.
+    pub fn book_all(&mut self, points: impl IntoIterator<Item = (i32, i32)>) {
+        let Self { lines, ledger } = self;
+        let mut counts = ledger.no_counts();
+        for (row, col) in points {
+            lines.each_charge(row, col, |module, cost| counts[ledger.module_index(module)] += cost);
+        }
+        ledger.book_counts(&counts);
+    }
+
+    /// Takes back what a point cost.
+    ///
+    /// # Panics
+    /// When it was not booked.
+    pub fn refund(&mut self, row: i32, col: i32) {
+        self.each_charge(row, col, Ledger::refund);
+    }
+
+    fn each_charge(&mut self, row: i32, col: i32, book: impl Fn(&mut Ledger, ModuleId, u32)) {
+        let Self { lines, ledger } = self;
+        lines.each_charge(row, col, |module, cost| book(ledger, module, cost));
+    }
+
+    /// Takes the room of a point that a neighbour chose on a shared side.
+    pub fn inherit(&mut self, row: i32, col: i32) {
+        if let Some(Charged::Between(first, second)) = self.lines.charged(row, col) {
+            for module in [first, second].into_iter().filter(|&module| self.lines.contain(module)) {
+                self.ledger.inherit(module, 1);
+            }
+        }
+    }
+
+    /// Whether a point there counts in a load module or window that has more than it may.
+    pub fn is_over(&self, row: i32, col: i32) -> bool {
+        match self.lines.charged(row, col) {
+            Some(Charged::Inside(module) | Charged::Beside(module)) => self.ledger.is_over(module),
+            Some(Charged::Between(first, second)) => self.ledger.is_over(first) || self.ledger.is_over(second),
+            None => false,
+        }
+    }
+
+    /// What a point there is charged to; `None` for a load-module corner.
+    pub fn charged(&self, row: i32, col: i32) -> Option<Charged> {
+        self.lines.charged(row, col)
+    }
+
+    /// The counts behind it.
+    pub fn counts(&self) -> &Ledger {
+        &self.ledger
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::ModuleGrid;
     use crate::limits::Windows;
+
+    use super::*;
 
     fn ledger(module_room: u32, window_room: u32) -> Ledger {
         let grid = ModuleGrid { rows: 6, cols: 6, side_cells: 20 };

@@ -47,7 +47,7 @@ impl ModuleLines {
     }
 
     /// Calls `each` with the load modules that a point is charged to, and with how many triangles.
-    pub fn each_charge(&self, row: i32, col: i32, mut each: impl FnMut(ModuleId, u32)) {
+    pub(crate) fn each_charge(&self, row: i32, col: i32, mut each: impl FnMut(ModuleId, u32)) {
         match self.charged(row, col) {
             Some(Charged::Inside(module)) => each(module, POINT_COST),
             Some(Charged::Between(first, second)) => {
@@ -69,7 +69,7 @@ impl ModuleLines {
     }
 
     /// Whether `module` lies in the tile itself.
-    pub fn contain(&self, module: ModuleId) -> bool {
+    pub(crate) fn contain(&self, module: ModuleId) -> bool {
         let (row, col) = (module.row.wrapping_sub(self.south_west.row), module.col.wrapping_sub(self.south_west.col));
         row < self.rows && col < self.cols
     }

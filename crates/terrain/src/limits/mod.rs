@@ -7,12 +7,10 @@ mod windows;
 pub use windows::Windows;
 mod ledger;
 mod lines;
-pub use ledger::{Allowance, Ledger, ShortOf, Shortfall};
+pub use ledger::{Allowance, Ledger, ShortOf, Shortfall, TileLedger};
 pub use lines::{Charged, ModuleLines};
 mod features;
 pub use features::{FeatureCost, feature_cost};
-mod tile_ledger;
-pub use tile_ledger::TileLedger;
 
 use super::{ModuleGrid, ModuleId};
 

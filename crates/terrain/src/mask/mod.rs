@@ -44,7 +44,7 @@ impl Mask<'_> {
     /// Names of the classes by index: `default`, then each new class in the order in which areas name it.
     ///
     /// An area may name `default` itself, to give a part of another area back.
-    pub fn class_names(&self) -> Vec<&str> {
+    pub(crate) fn class_names(&self) -> Vec<&str> {
         let mut names = vec!["default"];
         for area in self.areas.iter().chain(&self.over) {
             if !names.contains(&area.class.as_str()) {
@@ -55,7 +55,7 @@ impl Mask<'_> {
     }
 
     /// Whether every post of any window weighs the same and is of the default class.
-    pub fn is_uniform(&self) -> bool {
+    pub(crate) fn is_uniform(&self) -> bool {
         self.areas.is_empty() && self.over.is_empty()
     }
 }

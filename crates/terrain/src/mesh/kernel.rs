@@ -7,7 +7,7 @@ use crate::geometry::LocalPost;
 pub type EdgeRef = u32;
 
 /// The twin of an edge on the border of the tile.
-pub const NO_TWIN: EdgeRef = u32::MAX;
+pub(crate) const NO_TWIN: EdgeRef = u32::MAX;
 
 /// One triangle. A post is inserted by rewriting triangles whose first corner is then that post, so
 /// (triangle, first corner) names one state of a record and serves as its version.
@@ -98,11 +98,6 @@ impl Mesh {
     #[inline(always)]
     pub fn triangles(&self) -> &[Triangle] {
         &self.triangles
-    }
-
-    /// The lines edges may not cross.
-    pub fn lines(&self) -> Lines {
-        self.lines
     }
 
     /// Makes room for `posts` more posts.
@@ -247,7 +242,7 @@ impl Lines {
     }
 
     /// Posts between lines, if there are any.
-    pub fn step(&self) -> Option<i32> {
+    pub(crate) fn step(&self) -> Option<i32> {
         (self.step != u32::MAX).then_some(self.step as i32)
     }
 
@@ -259,19 +254,19 @@ impl Lines {
 
     /// Whether `post` lies on a line of posts running east.
     #[inline(always)]
-    pub fn holds_row(&self, post: LocalPost) -> bool {
+    pub(crate) fn holds_row(&self, post: LocalPost) -> bool {
         self.holds(post.row())
     }
 
     /// Whether `post` lies on a line of posts running north.
     #[inline(always)]
-    pub fn holds_col(&self, post: LocalPost) -> bool {
+    pub(crate) fn holds_col(&self, post: LocalPost) -> bool {
         self.holds(post.col())
     }
 
     /// Whether the edge `a`, `b` lies on a line.
     #[inline(always)]
-    pub fn constrain(&self, a: LocalPost, b: LocalPost) -> bool {
+    pub(crate) fn constrain(&self, a: LocalPost, b: LocalPost) -> bool {
         (a.row() == b.row() && self.holds_row(a)) || (a.col() == b.col() && self.holds_col(a))
     }
 }

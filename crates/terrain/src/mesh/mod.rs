@@ -14,6 +14,6 @@
 //! ```
 
 mod kernel;
-pub use kernel::{EdgeRef, Lines, Mesh, NO_TWIN, Triangle};
+pub use kernel::{EdgeRef, Lines, Mesh, Triangle};
 mod delaunay;
 pub use delaunay::{constrained_delaunay, delaunay};

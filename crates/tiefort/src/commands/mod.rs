@@ -20,7 +20,6 @@ mod init_limits;
 mod job_words;
 mod man;
 pub mod plan;
-mod plan_features;
 mod profile;
 mod render;
 mod report;

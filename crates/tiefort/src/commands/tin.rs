@@ -270,7 +270,7 @@ fn told(
     let mut text = format!("{} levels in {seconds:.1} s\n{}", meshes.len(), table.text(0));
     for ((mesh, out), asked) in meshes.iter().zip(outs).zip(&arguments.levels) {
         if mesh.points < *asked as usize {
-            text += &format!("{}: {}\n", files::shown(out).display(), end(mesh.stop));
+            text += &format!("{}: {}\n", files::shown(out).display(), end_in_words(mesh.stop));
         }
     }
     for (measured, out) in measured.iter().zip(outs).filter(|(measured, _)| measured.is_some()) {
@@ -411,7 +411,8 @@ pub fn write_mesh(mesh: &Mesh, kind: Kind, on_map: bool, out: &Path) -> Result<(
     })
 }
 
-fn end(stop: StopReason) -> &'static str {
+/// Why a mesh has no more vertices.
+pub fn end_in_words(stop: StopReason) -> &'static str {
     match stop {
         StopReason::BudgetSpent => "all points are spent",
         StopReason::ResidualReached => "the largest residual is reached",
@@ -421,7 +422,7 @@ fn end(stop: StopReason) -> &'static str {
 }
 
 fn summary(mesh: &Mesh, seconds: f64) -> String {
-    let end = end(mesh.stop);
+    let end = end_in_words(mesh.stop);
     let (points, triangles) = (grouped(mesh.points as u64), grouped(mesh.tin.triangles.len() as u64));
     let (rms_m, p99_m, max_m) = (mesh.residual.rms_m, mesh.residual.p99_m, mesh.residual.max_m);
     let residual = format!("RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m");

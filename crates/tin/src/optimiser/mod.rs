@@ -45,7 +45,6 @@ mod recipe;
 pub use recipe::overshoot;
 
 mod account;
-mod curve;
 mod deep_flips;
 mod deep_thinning;
 mod descent;
@@ -58,7 +57,6 @@ mod hold;
 mod hole;
 mod insertion;
 mod lanes;
-mod lattice;
 mod moments;
 mod normal;
 mod parts;

@@ -1,8 +1,8 @@
 //! Neighbours in space become neighbours in memory again.
 
-use crate::optimiser::curve::along_curve;
 use crate::optimiser::parts::{NONE, Vertex};
 use crate::optimiser::place::Place;
+use crate::optimiser::place::along_curve;
 use crate::optimiser::tile_mesh::{TileMesh, Triangle};
 
 impl TileMesh<'_> {

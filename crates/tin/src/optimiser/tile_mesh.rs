@@ -2,11 +2,11 @@
 
 use terrain::{PostRect, Tin, Vertex as TinVertex};
 
-use crate::optimiser::curve::along_curve;
 use crate::optimiser::form::Form;
 use crate::optimiser::hold::Hold;
 use crate::optimiser::moments::Sums;
 use crate::optimiser::parts::{NONE, Parts, Vertex, line_hold};
+use crate::optimiser::place::along_curve;
 use crate::optimiser::place::{Place, is_eased};
 use crate::optimiser::weighted_heights::WeightedHeights;
 

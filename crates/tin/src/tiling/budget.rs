@@ -96,7 +96,7 @@ impl Budget {
     }
 
     /// Sides of `module` that its tile inherits: the neighbours choose the points there.
-    pub fn inherited_sides(&self, tiling: &Tiling, module: ModuleId) -> u32 {
+    pub(crate) fn inherited_sides(&self, tiling: &Tiling, module: ModuleId) -> u32 {
         let tile = tiling.tile_of_module(module, self.grid);
         let (rect, posts) = (tiling.rect(tile), self.grid.posts_of(module));
         let on_side = |side| crate::tiling::outer_sides(posts, rect).is_open(side);

@@ -42,7 +42,7 @@ impl Tiling {
     }
 
     /// Number of tiles.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.rows() as usize * self.cols() as usize
     }
 

@@ -27,7 +27,7 @@ const LEVEL_M: f64 = 0.05;
 const UNEVEN: f64 = 3.0;
 
 /// What a report gives reason to change, most pressing first. Empty when there is nothing to say.
-pub fn advise(report: &Report) -> Vec<Advice> {
+pub(crate) fn advise(report: &Report) -> Vec<Advice> {
     [
         breached(report),
         network(report),

@@ -8,8 +8,8 @@ mod maps;
 mod marks;
 mod tables;
 
+pub(crate) use advice::advise;
 pub(crate) use advice::place_text;
-pub use advice::{Advice, advise};
 pub(crate) use tables::table;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};

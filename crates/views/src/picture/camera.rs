@@ -19,7 +19,7 @@ pub struct Camera {
 impl Camera {
     /// One that looks over all of an extent (west, south, east, north) from `direction_degrees`, at heights between
     /// `range_m`, which are drawn `times` as large.
-    pub fn overlooking(
+    pub(crate) fn overlooking(
         [west, south, east, north]: [f64; 4],
         range_m: (f64, f64),
         times: f64,

@@ -167,7 +167,7 @@ impl Facets {
     }
 
     /// Those of load modules.
-    pub fn of_modules<'a>(
+    pub(crate) fn of_modules<'a>(
         modules: impl IntoIterator<Item = &'a LoadModule>,
         grid: ModuleGrid,
         spacing: Spacing,
@@ -193,7 +193,7 @@ impl Facets {
     }
 
     /// How many triangles of the ground, bridges not among them.
-    pub fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.corners.len()
     }
 

@@ -17,7 +17,7 @@ impl Image {
     ///
     /// # Panics
     /// When a side is 0.
-    pub fn new(wide: usize, high: usize, color: Color) -> Self {
+    pub(crate) fn new(wide: usize, high: usize, color: Color) -> Self {
         assert!(0 < wide && 0 < high, "a picture has pixels");
         Self { wide, high, pixels: vec![color; wide * high] }
     }
@@ -32,17 +32,17 @@ impl Image {
     }
 
     /// Pixels across.
-    pub fn wide(&self) -> usize {
+    pub(crate) fn wide(&self) -> usize {
         self.wide
     }
 
     /// Pixels down.
-    pub fn high(&self) -> usize {
+    pub(crate) fn high(&self) -> usize {
         self.high
     }
 
     /// The colour at a place.
-    pub fn pixel(&self, x: usize, y: usize) -> Color {
+    pub(crate) fn pixel(&self, x: usize, y: usize) -> Color {
         self.pixels[y * self.wide + x]
     }
 
@@ -132,7 +132,7 @@ impl Image {
     ///
     /// # Panics
     /// When there is none.
-    pub fn beside(images: &[Image], gap: usize) -> Image {
+    pub(crate) fn beside(images: &[Image], gap: usize) -> Image {
         let wide = images.iter().map(|image| image.wide + gap).sum::<usize>() - gap;
         let high = images.iter().map(|image| image.high).max().expect("there is a picture");
         let mut whole = Image::new(wide, high, WHITE);

@@ -24,7 +24,6 @@ mod perspective;
 mod relief;
 mod residual_map;
 mod scene;
-mod seen;
 mod sheet;
 mod sight;
 mod text;
@@ -37,13 +36,13 @@ pub use errors::{draw_errors, draw_module_limits};
 pub use facets::{Cover, Facets};
 pub use image::Image;
 pub use panels::{Panel, Style, draw_panels};
-pub use perspective::{Drawn, Look, Surface, draw_perspective, draw_wireframe};
+pub use perspective::{Drawn, Look, Surface};
 pub use relief::Shown;
 pub use residual_map::RESIDUAL_SCALE_M;
 pub use scene::{NO_RESIDUAL, Scene, SceneFeatures, SceneGround, SceneLimits, SceneTile};
-pub use seen::{SeenGround, draw_seen};
 pub(crate) use sheet::{Drawing, Key, Legend, length_text, round_length};
 pub use sight::{Eye, Sight, draw_sight};
+pub use sight::{SeenGround, draw_seen};
 pub(crate) use wireframe::module_pictures;
 
 /// A map of a scene.
@@ -63,13 +62,6 @@ pub enum Map {
     Tiles,
     /// Roads and water, and what became of them.
     Features,
-}
-
-impl Map {
-    /// Whether it shows the ground that the load modules were made from.
-    pub fn needs_ground(&self) -> bool {
-        matches!(self, Map::Relief(Shown::Dem | Shown::Both) | Map::Residuals(_))
-    }
 }
 
 /// Draws a map whose longer side is `longest` pixels, with all that stands around it.

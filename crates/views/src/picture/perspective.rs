@@ -63,7 +63,7 @@ const WALL: Color = [150, 140, 128];
 
 impl Surface<'_> {
     /// West, south, east and north, in metres from the area's south-west post.
-    pub fn extent_m(&self) -> [f64; 4] {
+    pub(crate) fn extent_m(&self) -> [f64; 4] {
         match self {
             Surface::Triangles(facets) => facets.extent_m,
             Surface::Posts(dem, [x, y], _) => {
@@ -91,7 +91,7 @@ impl Surface<'_> {
     }
 
     /// Lowest and highest height, in metres.
-    pub fn range_m(&self) -> (f64, f64) {
+    pub(crate) fn range_m(&self) -> (f64, f64) {
         match self {
             Surface::Triangles(facets) => facets.range_m(),
             Surface::Posts(dem, ..) => range_m(dem),
@@ -100,7 +100,7 @@ impl Surface<'_> {
 }
 
 /// Draws a surface in colours of its heights, under light from the north-west.
-pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
+pub(crate) fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
     let tints = Tints::new(look.range_m);
     let mut stage = Stage::new(surface, look, true);
     let half_m = stage.haze_half_m;
@@ -121,7 +121,7 @@ pub fn draw_perspective(surface: &Surface, look: &Look) -> Drawn {
 }
 
 /// Draws the edges of a surface that the observer sees: of every triangle; of a DEM a line every few posts.
-pub fn draw_wireframe(surface: &Surface, look: &Look) -> Drawn {
+pub(crate) fn draw_wireframe(surface: &Surface, look: &Look) -> Drawn {
     let mut stage = Stage::new(surface, look, false);
     let pale = |_: [f64; 2], _: f64| WHITE;
     stage.draw(surface, look.times, &pale);

@@ -78,16 +78,10 @@ impl Subject {
     /// When the ground cannot be used.
     pub fn refine(&self, method: TinMethod, start: Option<TinStart>, until: Until) -> Result<Tin, CompileError> {
         let request = TinRequest {
-            dem: Path::new("").into(),
-            crs: None,
-            method,
             points: if let Until::Points(points) = until { Some(points) } else { None },
-            triangles: None,
-            max_residual_m: None,
             rms_m: if let Until::RmsM(rms_m) = until { Some(rms_m) } else { None },
             start,
-            tiles: None,
-            workers: 1,
+            ..TinRequest::plain(Path::new("").into(), method)
         };
         Ok(untiled(&request, &self.dem, [self.spacing.0; 2])?.tin)
     }

@@ -38,7 +38,7 @@ fn check(mesh: &Mesh, tile: PostRect) {
             assert_eq!(other.twins[j], (index * 4 + i) as u32);
             let apex = other.corners[(j + 2) % 3];
             let opposite = record.corners[(i + 2) % 3];
-            let constrained = mesh.lines().constrain(from, to);
+            let constrained = mesh.lines.constrain(from, to);
             assert!(
                 constrained || !LocalPost::in_circle(&record.corners, apex, opposite),
                 "edge {from:?} {to:?} should be flipped"
