@@ -161,8 +161,24 @@ fn multipolygons_are_put_together_from_their_ways() {
         .relation(6, &[("type", "boundary"), ("natural", "water")], &[(1, 4, "outer")])
         .relation(7, &[("type", "multipolygon"), ("building", "yes")], &[(1, 4, "outer")]);
     let file = read(&osm);
-    assert_eq!(ids(&file), ["relation/5.1", "relation/5.2"]);
+    assert_eq!(ids(&file), ["relation/5.1", "relation/5.2", "relation/6"]);
     assert_eq!((rings(&file.features[0]), rings(&file.features[1])), (vec![4], vec![11, 4]));
+    assert_eq!(remarks(&file), [""; 0]);
+}
+
+#[test]
+fn rings_whose_ways_meet_at_two_nodes_of_one_place_are_closed() {
+    let mut osm = grid();
+    let at = |osm: &Osm, id| osm.nodes.iter().find(|node| node.0 == id).unwrap().1;
+    let twins = [(200, at(&osm, 11)), (201, at(&osm, 34)), (202, at(&osm, 22))];
+    osm.nodes.extend(twins);
+    let osm = osm
+        .way(1, &[], &[11, 12, 13, 14, 24, 34])
+        .way(2, &[], &[200, 21, 31, 41, 44, 201])
+        .way(3, &[], &[22, 23, 33, 202])
+        .relation(5, LAKE, &[(1, 1, "outer"), (1, 2, "outer"), (1, 3, "inner")]);
+    let file = read(&osm);
+    assert_eq!((ids(&file), rings(&file.features[0])), (vec!["relation/5"], vec![11, 4]));
     assert_eq!(remarks(&file), [""; 0]);
 }
 

@@ -1,6 +1,7 @@
 //! Lines and polygons of the ways and relations that were kept.
 
-use std::collections::HashSet;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
 
 use terrain::{Each, gather};
 
@@ -160,7 +161,9 @@ impl Drawer<'_> {
         if self.placing.allowance().is_spent() {
             return;
         }
-        let lines: Vec<(Role, &[i64])> = members.iter().map(|&(role, nodes, _)| (role, nodes)).collect();
+        let joined = self.joined_by_place(&members);
+        let lines: Vec<(Role, &[i64])> =
+            members.iter().zip(&joined).map(|(&(role, ..), nodes)| (role, nodes.as_ref())).collect();
         let (rings, open) = rings(&lines);
         let first = members.iter().flat_map(|&(_, nodes, _)| nodes).find_map(|&node| self.nodes.place(node));
         let at = first.filter(|&place| place != OFF_THE_EARTH).and_then(|place| {
@@ -195,6 +198,25 @@ impl Drawer<'_> {
                 self.feature(id, relation.tags, polygons.into_iter().map(Part::Polygon).collect());
             }
         }
+    }
+
+    /// The nodes of members, in which ends that lie at one place are one node: files made from others have two there.
+    fn joined_by_place<'b>(&self, members: &[(Role, &'b [i64], usize)]) -> Vec<Cow<'b, [i64]>> {
+        let mut at_place = HashMap::new();
+        let mut node_of =
+            |node: i64| self.nodes.place(node).map_or(node, |place| *at_place.entry(place).or_insert(node));
+        let joined = |&(_, nodes, _): &(Role, &'b [i64], usize)| {
+            let &[first, .., last] = nodes else { return Cow::Borrowed(nodes) };
+            let ends = [first, last].map(&mut node_of);
+            if ends == [first, last] {
+                return Cow::Borrowed(nodes);
+            }
+            let mut nodes = nodes.to_vec();
+            let end = nodes.len() - 1;
+            (nodes[0], nodes[end]) = (ends[0], ends[1]);
+            Cow::Owned(nodes)
+        };
+        members.iter().map(joined).collect()
     }
 
     /// Ways of outlines that would be read a second time by their own tags.
