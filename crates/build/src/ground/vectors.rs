@@ -208,3 +208,14 @@ fn position([east_m, north_m]: [f64; 2], height_m: Option<f64>, frame: &GridFram
     let posts = [(east_m - frame.origin_east_m) / spacing, (north_m - frame.origin_north_m) / spacing];
     Position { east: posts[0], north: posts[1], height_m }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_openstreetmap_names_is_known_by_its_name() {
+        let numberings = ["way/12", "relation/12.1", "roads/12", "12"].map(numbering_of);
+        assert_eq!(numberings, [Numbering::Way, Numbering::Relation, Numbering::Row, Numbering::Row]);
+    }
+}
