@@ -6,7 +6,7 @@ use terrain::ObjectKind;
 use terrain::plans::{common, sorted_out, union};
 
 use super::corners::{fewer, smoothed};
-use super::plan::{At, FAR, METRE, Plan, Ring, bounds, doubled_area, edges, length};
+use super::plan::{At, FAR, METRE, Plan, Ring, bounds, doubled_area, edges, length, ring_area};
 use super::table::Traits;
 
 /// An object as a source has it.
@@ -61,6 +61,8 @@ pub(super) const WOOD_M2_MIN: f64 = 400.0;
 pub(super) const CLASS_M: f64 = 3.0;
 /// Metres of a stretch of wall, which has one roof.
 const WALL_M_MAX: f64 = 25.0;
+/// Square metres by which an outline has to differ from a simple one to be told.
+const CROSSED_M2_MIN: f64 = 1.0;
 /// Why an object with a place that is no number, or is far away, is left out.
 const NO_PLACE: &str = "a place that is none";
 /// The part of an outline that parts of the building have to cover to stand in its place.
@@ -91,6 +93,9 @@ pub fn mended(found: Vec<FoundObject>, options: &ObjectOptions) -> (Vec<Outline>
             tell(found, Some("taken as if it were not there"));
         }
         let traits = object.traits;
+        if matches!(&object.shape, FoundShape::Polygon(rings) if is_crossed(rings)) {
+            tell("an outline that crosses itself".into(), Some("what it encloses an odd number of times was taken"));
+        }
         match plans_of(&object.shape, traits, options) {
             Err(why) => tell(why.to_owned(), None),
             Ok(plans) if is_wood(&object.shape, traits.kind) => {
@@ -140,6 +145,17 @@ fn plans_of(shape: &FoundShape, traits: Traits, options: &ObjectOptions) -> Resu
         }
     };
     if plans.is_empty() { Err("without length or area") } else { Ok(plans) }
+}
+
+/// Whether rings cross themselves or each other, by more than what is too small for a flaw: what they enclose an odd
+/// number of times is then not what the outer one encloses without its holes.
+fn is_crossed(rings: &[Vec<[f64; 2]>]) -> bool {
+    let Some(rings) = rings.iter().map(|ring| lattice(ring)).collect::<Option<Plan>>() else { return false };
+    let own = |ring: &Ring| ring_area(ring).abs();
+    let Some((outer, holes)) = rings.split_first() else { return false };
+    let simple = own(outer) - holes.iter().map(own).sum::<i64>();
+    let enclosed: i64 = sorted_out(rings).iter().map(doubled_area).sum();
+    2.0 * CROSSED_M2_MIN * METRE * METRE < (enclosed - simple).abs() as f64
 }
 
 fn first_place(shape: &FoundShape) -> Option<[f64; 2]> {

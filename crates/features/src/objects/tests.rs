@@ -100,8 +100,9 @@ fn bad_outlines_are_mended_or_left_out_and_told() {
     let bow = [[0.0, 0.0], [20.0, 20.0], [20.0, 0.0], [0.0, 20.0], [0.0, 0.0]];
     let flat = vec![[0.0, 0.0], [20.0, 0.0], [40.0, 0.0], [0.0, 0.0]];
     let polygon = |ring: Vec<[f64; 2]>| object("x", &[("building", "yes")], FoundShape::Polygon(vec![ring]));
-    let (crossed, _) = made(vec![polygon(bow.iter().map(|[x, y]| [x + 50.0, y + 50.0]).collect())]);
+    let (crossed, told) = made(vec![polygon(bow.iter().map(|[x, y]| [x + 50.0, y + 50.0]).collect())]);
     assert_eq!(crossed.kinds[&ObjectKind::Building][0].count, 2, "a bow tie is two triangles");
+    assert!(told.len() == 1 && told[0].found.contains("crosses itself") && told[0].done.is_some(), "{told:?}");
     for (ring, told) in [
         (flat, "without area"),
         (square([100.0, 100.0], 3.0), "area_min"),
