@@ -670,11 +670,13 @@ mod tests {
     #[test]
     fn a_narrow_way_becomes_a_line_but_its_bridge_keeps_a_deck() {
         let sources = vec![
-            way(1, "highway=service width=1", &[(10.0, 20.0), (20.0, 20.0)]),
-            way(2, "highway=service width=1 bridge=yes", &[(20.0, 20.0), (40.0, 20.0)]),
-            way(3, "highway=service width=1", &[(40.0, 20.0), (45.0, 20.0)]),
+            way(1, "highway=service", &[(10.0, 20.0), (20.0, 20.0)]),
+            way(2, "highway=service bridge=yes", &[(20.0, 20.0), (40.0, 20.0)]),
+            way(3, "highway=service", &[(40.0, 20.0), (45.0, 20.0)]),
         ];
-        let formed = formed(sources, |_, north| 0.2 * north);
+        let mut rounded = rounded(sources);
+        rounded.ways.iter_mut().for_each(|way| way.traits.width = 3 * site().lattice.quanta_per_step());
+        let formed = formed_between(rounded, |_, north| 0.2 * north, Scope::NearChanged);
         assert!(formed.faces.is_empty(), "{:?}", formed.faces);
         let length = formed.decks.iter().map(|deck| {
             let cols = deck.corners.iter().map(|(place, _)| place.col);

@@ -139,11 +139,10 @@ impl<'a> Reader<'a> {
                 let of_buildings = BuildingTexts::of(&block);
                 let mut known = KnownTexts::of(&block);
                 block.relations(|relation| {
-                    // Relations of either type are areas.
-                    let is_area = |value: &[u8]| value == b"multipolygon" || value == b"boundary";
-                    let mut tags = relation.tags.iter();
-                    let is_multipolygon =
-                        tags.any(|&(key, value)| block.texts[key] == b"type" && is_area(block.texts[value]));
+                    let is_multipolygon = relation
+                        .tags
+                        .iter()
+                        .any(|&(key, value)| block.texts[key] == b"type" && block.texts[value] == b"multipolygon");
                     if let (true, Some(buildings)) = (is_multipolygon, &mut *buildings) {
                         buildings.see_relation(&block, relation, &of_buildings, (&mut known, texts), allowance)?;
                     }
