@@ -73,19 +73,18 @@ impl Ways {
 
     fn add(&mut self, line: &ModuleLine, family: u8, ground: &Ground) {
         let places: Vec<At> = line.vertices.iter().map(|vertex| ground.square.at(vertex.y, vertex.x)).collect();
+        let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
         let traits = line.traits;
         // A channel in a tunnel is one that passes below a road.
         if traits.is_kept && (traits.storey != LineStorey::Tunnel || traits.kind == LineKind::Channel) {
             self.found.kept_m += places.windows(2).map(length_m).sum::<f64>();
         }
         if traits.is_in_ground {
-            let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
             self.look(&places, &heights, traits.kind, ground);
             let off = places.iter().zip(&heights).map(|(&at, &height)| (ground.off_m(at, height), at));
             self.off.extend(off.filter(|(off_m, _)| OFF_MAX_M < *off_m));
         }
         if traits.is_kept && traits.storey == LineStorey::Bridge {
-            let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
             let bare = stretches(&places, &heights, |ends, heights| ground.undecked(ends, heights));
             self.undecked.extend(bare.into_iter().filter(|(long_m, _)| BARE_MIN_M < *long_m));
         }
