@@ -192,7 +192,7 @@ fn to_outlines(
     remarks.extend(overlaps.into_iter().map(|at_m| FeatureRemark {
         feature: "wood".to_owned(),
         at_m: Some(map(at_m)),
-        found: "roads, water or buildings under it, which cost more to leave free than the wood".to_owned(),
+        found: "roads, water or buildings under it, and no room for a wood that leaves them free".to_owned(),
         done: "left over them".to_owned(),
         leaves_out: false,
         degrades: false,

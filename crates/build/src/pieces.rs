@@ -212,7 +212,8 @@ impl Cutting<'_> {
         for deck in decks {
             let class = self.classes[usize::from(deck.class)];
             let ring: Vec<Vertex> = deck.corners.iter().copied().map(vertex).collect();
-            for index in self.touching(deck.corners.iter().map(|(place, _)| *place), 0) {
+            // Within a post of a deck the ground is cut.
+            for index in self.touching(deck.corners.iter().map(|(place, _)| *place), 2 * self.steps) {
                 let deck = FeatureSurface { class, ground: SurfaceGround::Road, body: 0, ring: ring.clone() };
                 self.pieces[index].features.decks.push(deck);
             }

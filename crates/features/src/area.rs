@@ -172,10 +172,10 @@ impl AreaFeatures {
         &self.outlines
     }
 
-    /// What roads, railways and water cover, a metre added on both sides of ways, in quanta east and north of the
-    /// place 0, 0: woods leave it free. Tunnels are not among it.
+    /// What roads, railways and water cover, two metres added on both sides of ways, as far as their strips may lie
+    /// beside them, in quanta east and north of the place 0, 0: woods leave it free. Tunnels are not among it.
     pub fn covered(&self) -> Vec<Plan> {
-        const ASIDE: i32 = 2 * QUANTA_PER_METRE;
+        const ASIDE: i32 = 4 * QUANTA_PER_METRE;
         let quanta = self.site.lattice.quanta_per_step();
         let at = |place: &Place| [place.col, place.row].map(|step| step * quanta);
         let is_open = |way: &&Way| way.traits.kind.is_travelled() && !way.traits.storey.is_tunnel();

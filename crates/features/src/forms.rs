@@ -258,12 +258,8 @@ fn tilted(formed: &Formed, network: &Network, sharing: &Sharing) -> BTreeMap<u32
     let mut rooms = BTreeMap::new();
     for face in &formed.faces {
         let wide = || sharing.at_nodes.wide_of(face, &sharing.wide);
-        if gives_way(face) {
-            rooms.extend(wide().into_iter().map(|number| (number, Room::None)));
-        } else if has_steep_side(face) {
-            for number in wide() {
-                rooms.entry(number).or_insert(sharing.wide[number as usize].room.less());
-            }
+        if gives_way(face) || has_steep_side(face) {
+            rooms.extend(wide().into_iter().map(|number| (number, sharing.wide[number as usize].room.less())));
         }
     }
     rooms

@@ -1,12 +1,12 @@
 //! The working ground: the DEM with features burned in, as tiles are refined against it.
 //!
 //! On a road a post has the road's height, in water the level. Beside roads and water the ground slopes from their
-//! edges to the natural one, and no shore lies below its lake. Posts on roads and in water weigh nothing: their heights
-//! are decided.
+//! edges to the natural one, and no shore lies below its lake. Under decks and close beside them what stands in their
+//! way is cut. Posts on roads and in water weigh nothing: their heights are decided.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use features::{ROADSIDE_REACH_M, WATERSIDE_REACH_M, Watersides, height_in, moved_by_road, nearest_on, offs};
+use features::{CUT_RUN, ROADSIDE_REACH_M, WATERSIDE_REACH_M, Watersides, height_in, moved_by_road, nearest_on, offs};
 use terrain::{Dem, Importance, LatticePoint, Post, PostRect, QUANTA_PER_METRE, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
@@ -25,13 +25,15 @@ pub fn waterside_reach(spacing: Spacing) -> i32 {
 /// A window of natural ground in a tile, with what features put into the tile. A post is burned the same whichever tile
 /// it lies in and whichever window of it asks.
 pub fn burn(window: Window, features: &TileFeatures, (spacing, left_out_weight): (Spacing, f64)) -> Window {
-    let TileFeatures { surfaces, shaped, slopes, watersides, .. } = features;
-    if surfaces.is_empty() && shaped.is_empty() && slopes.is_empty() && watersides.is_empty() {
+    let TileFeatures { surfaces, shaped, slopes, watersides, decks, .. } = features;
+    let is_empty = surfaces.is_empty() && shaped.is_empty() && decks.is_empty();
+    if is_empty && slopes.is_empty() && watersides.is_empty() {
         return window;
     }
     let mut burning = Burning::new(&window, features, spacing);
     burning.watersides();
     burning.slopes();
+    burning.decks();
     burning.surfaces();
     burning.shores();
     let Burning { rect, heights, class_of, is_shaped, .. } = burning;
@@ -121,6 +123,32 @@ impl<'a> Burning<'a> {
         for (index, (steps, edge)) in nearest {
             let moved = |natural: i32| rounded(moved_by_road(edge, steps * quanta_per_step, natural.into()));
             self.heights[index] = self.heights[index].map(|natural| natural + moved(natural));
+        }
+    }
+
+    /// Cuts what stands above decks: half a metre below them, and within a post of them as steep as a cut is. A triangle
+    /// that reaches under a deck has its corners there.
+    fn decks(&mut self) {
+        const BELOW: i32 = QUANTA_PER_METRE / 2;
+        let quanta_per_step = self.spacing.metres() / f64::from(self.steps) * f64::from(QUANTA_PER_METRE);
+        for deck in &self.features.decks {
+            let ring = &deck.ring[..];
+            let under: HashSet<Post> = posts_inside(&[ring], self.steps, self.rect).into_iter().collect();
+            for post in self.posts_near(ring, 1) {
+                let at = self.place(post);
+                let beside = |(a, b): (&Vertex, &Vertex)| {
+                    let (steps, share) = nearest_on([*a, *b], at);
+                    let height = f64::from(a.height) + share * f64::from(b.height - a.height);
+                    (steps <= f64::from(self.steps)).then(|| rounded(height + steps * quanta_per_step / CUT_RUN))
+                };
+                let highest = match under.contains(&post) {
+                    true => Some(height_in(&[ring], at) - BELOW),
+                    false => ring.iter().zip(ring.iter().cycle().skip(1)).filter_map(beside).min(),
+                };
+                let index = self.rect.index(post);
+                let ground = self.heights[index];
+                self.heights[index] = ground.map(|ground| highest.map_or(ground, |highest| ground.min(highest)));
+            }
         }
     }
 
@@ -393,6 +421,25 @@ mod tests {
         assert_eq!(heights(-2560, &|posts| -1280 * (posts + 1)), [1920, 1280, 640, 0, 0]);
         // A wall that the DEM has stays where no rough ground beside the road is reached.
         assert_eq!(heights(0, &|posts| 12_800 * posts), [0; 5]);
+    }
+
+    #[test]
+    fn ground_above_a_deck_is_cut_and_roads_below_stay() {
+        // A deck at 10 m along row 10 of a plain at 20 m, with a road at 3 m across beneath it.
+        let ring = |[south, west, north, east]: [f64; 4], z: i32| {
+            vec![vertex(south, west, z), vertex(south, east, z), vertex(north, east, z), vertex(north, west, z)]
+        };
+        let road = surface(SurfaceGround::Road, ring([0.0, 9.5, 20.0, 10.5], 3 * 128));
+        let deck = surface(SurfaceGround::Road, ring([9.5, 4.5, 10.5, 15.5], 10 * 128));
+        let features = TileFeatures { decks: vec![deck], ..features(vec![road], Vec::new()) };
+        let window = burned(window(|_| Some(20 * 128)), &features);
+        let metres = |row, col| f64::from(window.dem.height(Post::new(row, col))) / 128.0;
+        assert_eq!((metres(10, 7), metres(10, 10), metres(10, 3), metres(10, 17)), (9.5, 3.0, 20.0, 20.0));
+        // Half a post from it as steep as a cut.
+        assert!((metres(11, 7) - (10.0 + 5.0 / 1.5)).abs() < 0.01, "{}", metres(11, 7));
+        // What lies below a deck stays.
+        let low = burned(self::window(|_| Some(5 * 128)), &TileFeatures { surfaces: Vec::new(), ..features });
+        assert!(low.dem.rect().posts().all(|post| low.dem.height(post) == 5 * 128));
     }
 
     #[test]

@@ -77,8 +77,8 @@ pub struct Granted {
     pub kinds: BTreeMap<ObjectKind, [ObjectTally; 2]>,
     /// What had no room, what hides most first.
     pub left_out: Vec<Wanting>,
-    /// Woods that stay over roads, water or buildings, since they would cost more than twice as much without: a place
-    /// in each load module, metres east and north.
+    /// Woods that stay over roads, water or buildings, since there is no room for what they would cost without: a
+    /// place in each load module, metres east and north.
     pub overlaps: Vec<[f64; 2]>,
 }
 
@@ -91,6 +91,8 @@ struct Claim {
     silhouette_m2: f64,
     /// What stands in each load module, for so many polygons.
     parts: Vec<([i32; 2], Part, u32)>,
+    /// A wood that leaves free what is under it, where that costs much more: in place of its part if there is room.
+    cleared: Option<Canopy>,
 }
 
 impl Claim {
@@ -101,6 +103,7 @@ impl Claim {
             height_m: f64::from(outline.traits.height) / METRE,
             silhouette_m2,
             parts: vec![part],
+            cleared: None,
         }
     }
 }
@@ -114,29 +117,30 @@ enum Part {
 pub struct Claims {
     /// What hides most first; ties go by content, as the order of outlines does.
     claims: Vec<Claim>,
-    overlaps: Vec<[f64; 2]>,
+    /// Quanta of a load module's side.
+    side: i32,
 }
 
 impl Claims {
     /// Those in load modules with a side of so many quanta, `size` of them in rows and columns from the place 0, 0.
-    /// Woods leave buildings and `free`, in quanta too, clear where that costs no more than they do.
+    /// Woods leave buildings and `free`, in quanta too, clear where that costs no more than they do or there is room.
     pub fn of(outlines: &[Outline], free: &[Plan], size: [i32; 2], side: i32) -> Self {
         let [rows, cols] = size;
         let solid = outlines.iter().filter(|outline| outline.traits.kind.is_prism()).map(|outline| &outline.plan);
         let has_woods = outlines.iter().any(|outline| !outline.traits.kind.is_prism());
         let clear = if has_woods { Clear::of(solid.chain(free), side) } else { Clear::default() };
         let inside = |[row, col]: [i32; 2]| 0 <= row && row < rows && 0 <= col && col < cols;
-        let (mut claims, mut overlaps) = (Vec::new(), Vec::new());
+        let mut claims = Vec::new();
         for outline in outlines {
             let pieces: Vec<Piece> =
                 cut(&outline.plan, side).into_iter().filter(|piece| inside(piece.module)).collect();
             match outline.traits.kind.is_prism() {
                 true => claims.extend(prisms(outline, &pieces, side)),
-                false => claims.extend(canopies(outline, &pieces, &clear, side, &mut overlaps)),
+                false => claims.extend(canopies(outline, &pieces, &clear, side)),
             }
         }
         claims.sort_by(|a, b| b.silhouette_m2.total_cmp(&a.silhouette_m2));
-        Self { claims, overlaps }
+        Self { claims, side }
     }
 
     /// By kind: what would be there within limits, and what was wanted.
@@ -148,22 +152,34 @@ impl Claims {
 
     /// What has room within limits.
     pub fn granted(&self, limits: &ObjectLimits) -> Granted {
-        let mut granted = Granted { overlaps: self.overlaps.clone(), ..Granted::default() };
-        self.each(limits, |claim, room| {
+        let (mut granted, mut crowded) = (Granted::default(), Vec::new());
+        let mut left = self.each(limits, |claim, room| {
             tally(&mut granted.kinds, claim, room.is_ok());
             if let Err(full) = room {
                 let Claim { kind, at_m, height_m, silhouette_m2, .. } = *claim;
                 granted.left_out.push(Wanting { kind, at_m, height_m, silhouette_m2, full });
                 return;
             }
-            for (module, part, _) in &claim.parts {
+            for (module, part, cost) in &claim.parts {
                 let objects = granted.modules.entry(*module).or_default();
-                match part {
-                    Part::Prism(prism) => objects.prisms.push(prism.clone()),
-                    Part::Canopy(canopy) => objects.canopies.push(canopy.clone()),
+                match (part, &claim.cleared) {
+                    (Part::Prism(prism), _) => objects.prisms.push(prism.clone()),
+                    (Part::Canopy(canopy), None) => objects.canopies.push(canopy.clone()),
+                    (Part::Canopy(whole), Some(cleared)) => crowded.push((*module, *cost, [cleared, whole])),
                 }
             }
         });
+        // All that hides has its room now; what is left is for what woods leave free.
+        for (module, cost, [cleared, whole]) in crowded {
+            let has_room = left.take(&[(module, cleared.triangles.len() as u32 - cost)]).is_ok();
+            let canopy = if has_room { cleared } else { whole };
+            if !has_room {
+                let [row, col] = module;
+                let place = |axis: usize| f64::from([col, row][axis] * self.side) + f64::from(whole.places[0][axis]);
+                granted.overlaps.push([0, 1].map(|axis| place(axis) / METRE));
+            }
+            granted.modules.entry(module).or_default().canopies.push(canopy.clone());
+        }
         for objects in granted.modules.values_mut() {
             objects.prisms.sort();
             objects.canopies.sort();
@@ -171,13 +187,14 @@ impl Claims {
         granted
     }
 
-    /// Calls with each claim in order, and whether it has room.
-    fn each(&self, limits: &ObjectLimits, mut told: impl FnMut(&Claim, Result<(), Full>)) {
+    /// Calls with each claim in order, and whether it has room; and what room is left.
+    fn each<'a, 'l>(&'a self, limits: &'l ObjectLimits, mut told: impl FnMut(&'a Claim, Result<(), Full>)) -> Room<'l> {
         let mut room = Room::new(limits);
         for claim in &self.claims {
             let costs: Vec<([i32; 2], u32)> = claim.parts.iter().map(|(module, _, cost)| (*module, *cost)).collect();
             told(claim, room.take(&costs));
         }
+        room
     }
 }
 
@@ -220,41 +237,35 @@ fn prisms(outline: &Outline, pieces: &[Piece], side: i32) -> Vec<Claim> {
 }
 
 /// A wood as a claim in each load module: it need not be level, and so much need not hang together.
-fn canopies(outline: &Outline, pieces: &[Piece], clear: &Clear, side: i32, overlaps: &mut Vec<[f64; 2]>) -> Vec<Claim> {
+fn canopies(outline: &Outline, pieces: &[Piece], clear: &Clear, side: i32) -> Vec<Claim> {
     /// Triangles that a wood may cost in any case.
-    const SMALL: usize = 40;
+    const SMALL: u32 = 40;
     /// Metres between stems of trees, and of what is lower.
     const SPACING_M: [f64; 2] = [4.0, 2.0];
     let traits = &outline.traits;
     let spacing_m = SPACING_M[usize::from(traits.kind != ObjectKind::Wood)];
-    let mut lists = |pieces: &[Piece]| {
-        let whole = canopy_lists(pieces);
-        let Some(without) = clear.cut_out(pieces) else { return whole };
-        let cleared = canopy_lists(&without);
-        if cleared.1.len() <= (2 * whole.1.len()).max(SMALL) {
-            return cleared;
-        }
-        let [row, col] = pieces[0].module;
-        let at = pieces[0].plan[0][0];
-        overlaps.push([0, 1].map(|axis| f64::from([col, row][axis] * side + at[axis]) / METRE));
-        whole
+    let canopy = |pieces: &[Piece]| {
+        // Numbered in 16 bits: what has more corners in one load module is no outline that a person drew.
+        let fits = pieces.iter().flat_map(|piece| piece.plan.iter()).map(Vec::len).sum::<usize>() < PLACES_MAX;
+        let (places, triangles) = if fits { canopy_lists(pieces) } else { Default::default() };
+        let cost = if fits { triangles.len() as u32 } else { u32::MAX };
+        let (id, kind, fullness) = (id_of(outline, 0), traits.kind, traits.fullness);
+        let height = u16::try_from(traits.height).unwrap_or(u16::MAX);
+        (Canopy { id, kind, height, fullness, spacing: (spacing_m * METRE) as u16, places, triangles }, cost)
     };
     let claim = |pieces: &[Piece]| {
         let around = pieces.iter().map(|piece| border(&walled(piece, &outline.plan, side))).sum();
-        // Numbered in 16 bits: what has more corners in one load module is no outline that a person drew.
-        let fits = pieces.iter().flat_map(|piece| piece.plan.iter()).map(Vec::len).sum::<usize>() < PLACES_MAX;
-        let (places, triangles) = if fits { lists(pieces) } else { Default::default() };
-        let cost = if fits { triangles.len() as u32 } else { u32::MAX };
-        let canopy = Canopy {
-            id: id_of(outline, 0),
-            kind: traits.kind,
-            height: u16::try_from(traits.height).unwrap_or(u16::MAX),
-            fullness: traits.fullness,
-            spacing: (spacing_m * METRE) as u16,
-            places,
-            triangles,
+        let claim = |(canopy, cost)| {
+            Claim::of(outline, traits.silhouette_m2(around), (pieces[0].module, Part::Canopy(canopy), cost))
         };
-        Claim::of(outline, traits.silhouette_m2(around), (pieces[0].module, Part::Canopy(canopy), cost))
+        let whole = canopy(pieces);
+        match clear.cut_out(pieces).map(|without| canopy(&without)) {
+            Some(cleared) if cleared.1 <= whole.1.saturating_mul(2).max(SMALL) => claim(cleared),
+            cleared => {
+                let cleared = cleared.filter(|(_, cost)| *cost < u32::MAX).map(|(canopy, _)| canopy);
+                Claim { cleared, ..claim(whole) }
+            }
+        }
     };
     pieces.chunk_by(|a, b| a.module == b.module).map(claim).filter(|claim| 0 < claim.parts[0].2).collect()
 }

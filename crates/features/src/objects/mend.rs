@@ -63,6 +63,8 @@ pub(super) const CLASS_M: f64 = 3.0;
 const WALL_M_MAX: f64 = 25.0;
 /// Square metres by which an outline has to differ from a simple one to be told.
 const CROSSED_M2_MIN: f64 = 1.0;
+/// The part of its area by which a building has to change for fewer corners to be told.
+const AREA_PART_TOLD: f64 = 0.1;
 /// Why an object with a place that is no number, or is far away, is left out.
 const NO_PLACE: &str = "a place that is none";
 /// The part of an outline that parts of the building have to cover to stand in its place.
@@ -93,10 +95,23 @@ pub fn mended(found: Vec<FoundObject>, options: &ObjectOptions) -> (Vec<Outline>
             tell(found, Some("taken as if it were not there"));
         }
         let traits = object.traits;
-        if matches!(&object.shape, FoundShape::Polygon(rings) if is_crossed(rings)) {
+        let enclosed = enclosed(&object.shape);
+        if let Some([simple, enclosed]) = enclosed
+            && CROSSED_M2_MIN < (enclosed - simple).abs()
+        {
             tell("an outline that crosses itself".into(), Some("what it encloses an odd number of times was taken"));
         }
-        match plans_of(&object.shape, traits, options) {
+        let plans = plans_of(&object.shape, traits, options);
+        if let (Some([_, enclosed]), Ok(plans), true) = (enclosed, &plans, traits.kind.is_prism()) {
+            let left: i64 = plans.iter().map(doubled_area).sum();
+            let changed = (left as f64 / (2.0 * METRE * METRE) - enclosed).abs();
+            if AREA_PART_TOLD * enclosed < changed && options.area_min_m2 < changed {
+                let found =
+                    format!("an outline that changes by {changed:.0} m2 with at most {} corners", options.corners_max);
+                tell(found, Some("simplified"));
+            }
+        }
+        match plans {
             Err(why) => tell(why.to_owned(), None),
             Ok(plans) if is_wood(&object.shape, traits.kind) => {
                 let class = (f64::from(traits.height) / (CLASS_M * METRE)).floor() as i32;
@@ -147,15 +162,16 @@ fn plans_of(shape: &FoundShape, traits: Traits, options: &ObjectOptions) -> Resu
     if plans.is_empty() { Err("without length or area") } else { Ok(plans) }
 }
 
-/// Whether rings cross themselves or each other, by more than what is too small for a flaw: what they enclose an odd
-/// number of times is then not what the outer one encloses without its holes.
-fn is_crossed(rings: &[Vec<[f64; 2]>]) -> bool {
-    let Some(rings) = rings.iter().map(|ring| lattice(ring)).collect::<Option<Plan>>() else { return false };
+/// Square metres of a polygon, `None` of what is none: of its outer ring without its holes, and of what its rings
+/// enclose an odd number of times. They differ where rings cross themselves or each other.
+fn enclosed(shape: &FoundShape) -> Option<[f64; 2]> {
+    let FoundShape::Polygon(rings) = shape else { return None };
+    let rings = rings.iter().map(|ring| lattice(ring)).collect::<Option<Plan>>()?;
     let own = |ring: &Ring| ring_area(ring).abs();
-    let Some((outer, holes)) = rings.split_first() else { return false };
+    let (outer, holes) = rings.split_first()?;
     let simple = own(outer) - holes.iter().map(own).sum::<i64>();
     let enclosed: i64 = sorted_out(rings).iter().map(doubled_area).sum();
-    2.0 * CROSSED_M2_MIN * METRE * METRE < (enclosed - simple).abs() as f64
+    Some([simple, enclosed].map(|doubled| doubled as f64 / (2.0 * METRE * METRE)))
 }
 
 fn first_place(shape: &FoundShape) -> Option<[f64; 2]> {
@@ -194,9 +210,34 @@ fn building(rings: &[Vec<[f64; 2]>], traits: Traits, options: &ObjectOptions) ->
     if large.is_empty() { Err("smaller than objects.area_min_m2") } else { Ok(large) }
 }
 
-/// What a way covers that is so many quanta wide: a rectangle along each of its edges.
+/// What a way covers that is so many quanta wide: a rectangle along each of its edges, and what they leave between them
+/// on the outer sides of bends.
 pub fn strips(line: &[[i32; 2]], width: i32) -> Vec<Plan> {
-    stretches(line, width, f64::MAX)
+    let bends = line.windows(3).filter_map(|places| outer_bend(places, f64::from(width) / 2.0));
+    stretches(line, width, f64::MAX).into_iter().chain(bends.flat_map(|ring| sorted_out(vec![ring]))).collect()
+}
+
+/// The corner on the outer side of a bend: from the place to both rectangles that meet there, and to where their sides
+/// do, unless the way nearly turns back.
+fn outer_bend(places: &[At], half: f64) -> Option<Ring> {
+    const TURN_COSINE_MIN: f64 = -0.5;
+    let direction = |from: At, to: At| {
+        let run = [0, 1].map(|axis| f64::from(to[axis]) - f64::from(from[axis]));
+        run.map(|along| along / length(from, to).max(1.0))
+    };
+    let at = places[1];
+    let [u, v] = [direction(places[0], at), direction(at, places[2])];
+    let (turn, cosine) = (u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1]);
+    if turn == 0.0 {
+        return None;
+    }
+    // A way that turns left has its outer side on the right.
+    let aside = |[x, y]: [f64; 2]| [y * turn.signum(), -x * turn.signum()];
+    let [u, v] = [aside(u), aside(v)];
+    let place = |off: [f64; 2]| [0, 1].map(|axis| at[axis] + (half * off[axis]).round() as i32);
+    let meet = [0, 1].map(|axis| (u[axis] + v[axis]) / (1.0 + cosine));
+    let tip = (TURN_COSINE_MIN < cosine).then(|| place(meet));
+    Some([Some(at), Some(place(u)), tip, Some(place(v))].into_iter().flatten().collect())
 }
 
 /// The rectangles along a line, each as long as `most` quanta at most; they overlap where the line bends.

@@ -184,11 +184,25 @@ fn woods_leave_roads_and_buildings_free() {
     let bend = 150.0 * (1.0_f64 + 0.0625).sqrt();
     let expected = 90_000.0 - 400.0 - 8.0 * (150.0 + bend);
     assert!((area(&road) - expected).abs() < 20.0, "{}, expected {expected}", area(&road));
-    // As many roads as would cost more than the wood.
+    // At a sharp bend nothing is left between the edges, on either side.
+    let bend = strips(&[[250.0, 150.0], [250.0, 250.0], [320.0, 180.0]].map(quanta), 8 * 128);
+    let left = Claims::of(&outlines, &bend, [2, 2], SIDE).granted(&limits(400, 12_800));
+    let canopy = &left.modules[&[0, 0]].canopies[0];
+    let near = canopy.places.iter().filter(|at| (f64::from(at[0]) / METRE - 250.0).abs() < 3.9);
+    let between = near.filter(|at| (145.0..249.0).contains(&(f64::from(at[1]) / METRE)));
+    assert_eq!(between.collect::<Vec<_>>(), Vec::<&[u16; 2]>::new());
+    // As many roads as cost much more than the wood: they are free where there is room for that, and the wood is there in
+    // any case.
     let many: Vec<Plan> =
         (0..40).flat_map(|k| strips(&[[90.0 + 8.0 * f64::from(k), 90.0], [98.0, 410.0]].map(quanta), 128)).collect();
-    let crossed = Claims::of(&outlines, &many, [2, 2], SIDE).granted(&limits(400, 12_800));
-    assert_eq!((crossed.overlaps.len(), crossed.modules[&[0, 0]].canopies[0].triangles.len()), (1, 2));
+    let claims = Claims::of(&outlines, &many, [2, 2], SIDE);
+    let woods = |per_module: u32| {
+        let granted = claims.granted(&limits(per_module, 12_800));
+        (granted.overlaps.len(), granted.modules[&[0, 0]].canopies[0].triangles.len())
+    };
+    assert_eq!(woods(100), (1, 2));
+    let (overlaps, triangles) = woods(400);
+    assert!(overlaps == 0 && (100..400).contains(&triangles), "{overlaps} over roads, {triangles} triangles");
 }
 
 #[test]

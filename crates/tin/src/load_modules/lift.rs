@@ -31,8 +31,9 @@ struct Bounds {
 /// Bounds while corners can be added where they are needed.
 const USUAL: Bounds = Bounds { share_min: 0.1, is_capped: true };
 
-/// Bounds where there is no room for another: a deck that rises steeply is better than one in the ground.
-const LAST: Bounds = Bounds { share_min: 0.005, is_capped: false };
+/// Bounds where there is no room for another: a deck that rises steeply is better than one in the ground, but not one
+/// that rises by more than twice what is missing.
+const LAST: Bounds = Bounds { share_min: 0.5, is_capped: false };
 
 /// The least part of a height that a corner has to make up to have a say in it.
 const WEIGHT_MIN: f64 = 1e-9;
@@ -419,6 +420,17 @@ mod tests {
         assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
         let [before, after] = [&decks, &lifted].map(|decks| deepest(decks, &ground));
         assert!(2000.0 < before && after < ADDED_FOR, "{before} {after} {lifted:?}");
+    }
+
+    #[test]
+    fn no_corner_rises_far_above_the_ground_that_stands_above_a_deck() {
+        // A lip of 400 quanta close to the side, where corners stay, and no room for one more.
+        let mut ground = hill(0, 0);
+        ground.vertices[3] = vertex(20, 6400, 400);
+        let lifted = lift_decks(&deck(0), &ground, 2);
+        assert!(lifted.vertices.iter().all(|vertex| vertex.z <= 800), "{lifted:?}");
+        let roomy = lift_decks(&deck(0), &ground, 8);
+        assert!(roomy.vertices.iter().all(|vertex| vertex.z <= 800) && deepest(&roomy, &ground) < ADDED_FOR);
     }
 
     #[test]
