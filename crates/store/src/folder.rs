@@ -147,9 +147,11 @@ impl Folder {
     /// What `report.json` says.
     ///
     /// # Errors
-    /// When it is missing or damaged.
+    /// When it is missing, damaged or of another build.
     pub fn report(&self) -> Result<Report, DatabaseError> {
-        self.read_json(files::REPORT).map_err(|error| self.without(error))
+        let report: Report = self.read_json(files::REPORT).map_err(|error| self.without(error))?;
+        self.check_of_build(&report.files)?;
+        Ok(report)
     }
 
     /// The TIN of `tile`, and what it was made from.
@@ -388,7 +390,7 @@ impl Folder {
     /// # Errors
     /// When it is missing, or its length or content differs.
     pub fn check_file(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
-        check_stamp(path, &self.read(path)?, stamp)
+        check_stamp(path, &self.read(path)?, stamp, files::DATABASE)
     }
 
     /// All of one of its files.

@@ -218,11 +218,15 @@ fn verify_finds_levels_that_do_not_fit_together_and_those_that_are_not_in_the_jo
     let scene = Scene::new(&words("", "", "own"));
     let built = scene.build("area", 2);
     let manifest = Folder::new(scene.path("area")).manifest().unwrap();
+    let finish = |manifest: &store::Manifest| {
+        built.database.write_report(&mut built.report.clone(), manifest).unwrap();
+        built.database.finish(manifest).unwrap();
+    };
     let problems = |before: &str, after: &str| {
         let mut told = manifest.clone();
         told.job = told.job.replace(before, after);
         assert_ne!(told.job, manifest.job);
-        built.database.finish(&told).unwrap();
+        finish(&told);
         inspect::verify(&scene.path("area"), None).unwrap().problems
     };
     let torn = problems("border = \"own\"", "border = \"full\"");
@@ -232,6 +236,6 @@ fn verify_finds_levels_that_do_not_fit_together_and_those_that_are_not_in_the_jo
     assert_eq!(missing[0], "level 3: load module 0,0: missing");
     let more = problems(", { inner_share = 0.2 }", "");
     assert_eq!(more, ["load modules: 3 levels in a file, the job has 2"]);
-    built.database.finish(&manifest).unwrap();
+    finish(&manifest);
     scene.verify("area");
 }

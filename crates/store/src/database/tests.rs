@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::*;
-use crate::{TileState, samples};
+use crate::{Report, TileState, samples};
 
 fn stamped(manifest: &mut Manifest, database: &Database) {
     let record = manifest.tile_mut(samples::TILE).unwrap();
@@ -23,6 +23,7 @@ fn build(dir: &Path) -> Manifest {
     let allocation = database.write_json(files::ALLOCATION, &std::collections::BTreeMap::from([("n", 1)])).unwrap();
     manifest.files.insert(files::ALLOCATION.into(), allocation);
     manifest.state = ManifestState::Complete;
+    database.write_report(&mut Report::default(), &manifest).unwrap();
     database.finish(&manifest).unwrap();
     manifest
 }
