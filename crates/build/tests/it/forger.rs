@@ -32,7 +32,7 @@ impl Forged {
         Self {
             report: folder.report().unwrap(),
             tins: tiles.iter().map(|&tile| folder.read_tile(tile).unwrap()).collect(),
-            modules: tiles.iter().map(|&tile| folder.read_levels(tile).unwrap()).collect(),
+            modules: tiles.iter().map(|&tile| folder.read_levels(&manifest, tile).unwrap()).collect(),
             measured: tiles
                 .iter()
                 .map(|&tile| folder.read_measured(tile).unwrap())

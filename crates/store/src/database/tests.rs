@@ -38,8 +38,8 @@ fn what_was_written_is_read_and_verified() {
     assert_eq!(read.read_tile(samples::TILE).unwrap(), (samples::stamp(), samples::tile()));
     assert_eq!(read.tile_stamp(samples::TILE).unwrap(), Some(samples::stamp()));
     assert_eq!(read.tile_stamp(terrain::TileId { row: 5, col: 5 }).unwrap(), None);
-    assert_eq!(read.read_modules(samples::TILE).unwrap(), (samples::tile_modules(), samples::modules()));
-    assert_eq!(read.read_levels(samples::TILE).unwrap(), (samples::tile_modules(), samples::levels()));
+    assert_eq!(read.read_modules(&manifest, samples::TILE).unwrap(), (samples::tile_modules(), samples::modules()));
+    assert_eq!(read.read_levels(&manifest, samples::TILE).unwrap(), (samples::tile_modules(), samples::levels()));
     assert_eq!(read.read_curve(samples::TILE).unwrap(), (samples::stamp(), samples::curve()));
     assert!(read.verify(&manifest).unwrap().is_empty());
 }
