@@ -221,7 +221,8 @@ fn heights_of(levels: &[Vec<LoadModule>]) -> (i32, i32) {
 /// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
 pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<(Assembled, Sums), CompileError> {
     let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
-    let (_, mut levels) = folder.read_levels(tile)?;
+    let manifest = run.previous.as_ref().expect("a tile is run again only where a build has ended");
+    let (_, mut levels) = folder.read_levels(manifest, tile)?;
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let (modules, coarser) = numbers_of(&levels);
     let residuals = fidelity::measure(&mut levels[0], &window.measured(area));

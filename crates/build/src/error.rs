@@ -107,7 +107,9 @@ impl CompileError {
             CompileError::Panicked { .. } => {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }
-            CompileError::Stopped { .. } => Some("run the same command again to go on from here".to_owned()),
+            CompileError::Stopped { .. } => {
+                Some("run the same command again; nothing was left half-written".to_owned())
+            }
             CompileError::Package { .. } => Some("free some memory and build again".to_owned()),
             CompileError::OtherRun { .. } => {
                 Some("wait for them to end, or build into another folder with --out".to_owned())

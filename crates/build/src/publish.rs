@@ -1,6 +1,8 @@
 //! The manifest before anything changes; and the last stage: breaches, the report, its page, and the manifest when
 //! everything is there.
 
+use std::collections::BTreeMap;
+
 use crate::product::{Made, Opened, Product, Told, Wanted, WantedGround};
 use job::Job;
 use serde_json::{Value, json};
@@ -102,7 +104,7 @@ pub(crate) fn prepare(
 }
 
 /// Ends the last stage. What a run leaves is written in this order, so that a database is complete only with all of it:
-/// breaches, the report, its page, the manifest.
+/// what the report lists (breaches, features, objects, the page), the report, the manifest.
 pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Result<(Report, Database), CompileError> {
     let Ready { mut report, manifest, told } = ready;
     let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
@@ -114,38 +116,31 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     // The last moment: from here on everything says that it was made from these files.
     changed(&run.states)?;
     (report.stages, report.tiles) = progress.times();
-    let mut written: Vec<(&str, Vec<u8>)> =
-        crate::product::breaches(job, &report).into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
-    match told.zip(level) {
-        Some((told, level)) => {
-            let (name, text) = crate::product::features_file(job, &told.remarks);
-            written.push((name, text.into_bytes()));
-            written.push((files::FEATURES_GPKG, crate::product::features_package(job, &level, &told.remarks)?));
-        }
-        // Those of an earlier job.
-        None => [files::FEATURES, files::FEATURES_GPKG].iter().try_for_each(|name| database.remove(name))?,
+    let mut beside = BTreeMap::new();
+    let mut write = |name: &str, bytes: &[u8]| -> Result<(), CompileError> {
+        beside.insert(name.to_owned(), database.write_bytes(name, bytes)?);
+        Ok(())
+    };
+    for (name, text) in crate::product::breaches(job, &report) {
+        write(name, text.as_bytes())?;
     }
-    match outlines {
-        Some((_, outlines)) => {
-            let (name, text) = crate::product::objects_file(job, &outlines);
-            written.push((name, text.into_bytes()));
-        }
-        None => database.remove(files::OBJECTS)?,
+    if let Some((told, level)) = told.zip(level) {
+        let (name, text) = crate::product::features_file(job, &told.remarks);
+        write(name, text.as_bytes())?;
+        write(files::FEATURES_GPKG, &crate::product::features_package(job, &level, &told.remarks)?)?;
     }
-    for (name, bytes) in written {
-        let stamp = database.write_bytes(name, &bytes)?;
-        report.files.insert(name.to_owned(), stamp);
+    if let Some((_, outlines)) = outlines {
+        let (name, text) = crate::product::objects_file(job, &outlines);
+        write(name, text.as_bytes())?;
     }
-    database.write_json(files::REPORT, &report)?;
     if run.page {
         progress.tell(Event::Enter(Stage::Page, 0));
         let opened = Opened::of(database.folder().clone(), manifest.clone())?;
-        database.write_bytes(files::REPORT_HTML, draw(&opened, job, &report, run.workers.count())?.as_bytes())?;
+        write(files::REPORT_HTML, draw(&opened, job, &report, run.workers.count())?.as_bytes())?;
         progress.tell(Event::Leave(Stage::Page));
-    } else {
-        // That of an earlier build would tell of another one.
-        database.remove(files::REPORT_HTML)?;
     }
+    report.files = beside;
+    database.write_report(&mut report, &manifest)?;
     database.finish(&manifest)?;
     progress.tell(Event::Leave(Stage::Publish));
     work.sweep();

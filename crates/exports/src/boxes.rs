@@ -4,8 +4,9 @@ use terrain::{ModuleRect, Prism, QUANTA_PER_METRE};
 
 use crate::Product;
 
-/// Share of its least rectangle that an outline fills at least to be one box; else each of its walls is one.
-const FILLED_MIN: f64 = 0.8;
+/// Share of its least rectangle that an outline fills at least to be one box; else each of its walls is one: the
+/// corners of a box stand farther out the less of it is filled.
+const FILLED_MIN: f64 = 0.95;
 /// Thickness of the box of a wall, in metres, which lies inside of it.
 const WALL_M: f64 = 0.2;
 
@@ -101,5 +102,13 @@ mod tests {
         let angle = boxes_of(&prism(&[[0, 0], [2560, 0], [2560, 256], [256, 256], [256, 2560], [0, 2560]]), [128, 0]);
         assert_eq!((angle.len(), angle[0].size_m), (6, [20.0, WALL_M, 10.0]));
         assert_eq!(angle[0].middle_m, [11.0, 0.1, 15.0]);
+    }
+
+    #[test]
+    fn a_house_that_lacks_a_tenth_of_its_rectangle_has_a_box_for_each_wall() {
+        let cut =
+            |by: u16| boxes_of(&prism(&[[0, 0], [2560, 0], [2560, 1280 - by], [2560 - by, 1280], [0, 1280]]), [0, 0]);
+        // The corner that is cut off is an eighth and a fiftieth of the rectangle.
+        assert_eq!([cut(905), cut(362)].map(|boxes| boxes.len()), [5, 1]);
     }
 }

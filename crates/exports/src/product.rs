@@ -81,7 +81,10 @@ impl Product {
         let of_rect = |tile: &TileId| manifest.area.modules_of(*tile).and_then(|own| own.intersection(rect)).is_some();
         let ids: Vec<TileId> = manifest.tiles.iter().map(store::TileRecord::tile).filter(of_rect).collect();
         let read = work.each("tiles read", &ids, |&tile| {
-            let (tile, levels) = if block.is_some() { folder.read_part(tile, rect) } else { folder.read_levels(tile) }?;
+            let (tile, levels) = match block {
+                Some(_) => folder.read_part(&manifest, tile, rect),
+                None => folder.read_levels(&manifest, tile),
+            }?;
             let finest = levels.first().map_or(&[][..], Vec::as_slice).iter();
             let lines: Vec<_> = finest.map(|module| (module.id, module.lines.clone())).collect();
             Ok(((tile, wanted.of(levels)?), lines))

@@ -140,7 +140,7 @@ pub fn explain(
     let tile = opened.area.tiling.tile_of_module(module, opened.area.grid);
     let (_, tin) = opened.folder.read_tile(tile)?;
     let allocation = opened.folder.read_json(files::ALLOCATION)?;
-    let levels = levels(&opened.folder, tile, module)?;
+    let levels = levels(&opened, tile, module)?;
     let found = explained(&product, module, &tin, &allocation, &compared);
     let own = module_of(&product, module);
     let objects = explained_objects(&opened.folder, &product, own, found.extent_m)?;
@@ -258,8 +258,12 @@ fn explained(product: &Product, id: ModuleId, tin: &TileTin, allocation: &Value,
 }
 
 /// Triangles, RMS and largest residual of every level of a load module, where there are several.
-fn levels(folder: &Folder, tile: TileId, id: ModuleId) -> Result<Vec<(u32, f64, f64)>, CompileError> {
-    let (_, levels) = folder.read_levels(tile)?;
+fn levels(
+    Opened { folder, manifest, .. }: &Opened,
+    tile: TileId,
+    id: ModuleId,
+) -> Result<Vec<(u32, f64, f64)>, CompileError> {
+    let (_, levels) = folder.read_levels(manifest, tile)?;
     if levels.len() == 1 {
         return Ok(Vec::new());
     }

@@ -91,7 +91,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     locate_weights(&mut job, &manifest, folder.dir())?;
     let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
     let window = ground.window(area.rect)?;
-    let modules = read_modules(&folder, &area)?;
+    let modules = read_modules(&folder, &manifest)?;
     let totals = &manifest.totals;
     let rms_m = (totals.residual_sum_squared as f64 / totals.residual_posts.max(1) as f64).sqrt();
     let tolerance_m = tolerance_m.unwrap_or(3.0 * rms_m / f64::from(terrain::QUANTA_PER_METRE));

@@ -10,7 +10,7 @@ use build::product::{Opened, choose_ground, locate_weights};
 use fidelity::{DemGround, Measures, ResidualFigures, Triangles, regular_grid};
 use schedule::Workers;
 use serde::Serialize;
-use store::{Folder, Totals};
+use store::{Folder, Manifest, Totals};
 use terrain::{Dem, Importance, LoadModule, Metres, ModuleId, QUANTA_PER_METRE, Tin};
 
 /// Which pairs of places a line of sight is tried between.
@@ -159,7 +159,7 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         }
         .into());
     }
-    let (modules, polygons) = modules_of(&folder, &area)?;
+    let (modules, polygons) = modules_of(&folder, &manifest, &area)?;
     let at_own_posts = at_own_posts(&ground, &area, &modules)?;
     let triangles = Triangles::of_modules(modules.iter(), area.grid, area.frame.spacing);
     drop(modules);
@@ -231,8 +231,8 @@ fn at_own_posts(
 }
 
 /// All load modules, and how many polygons they count.
-fn modules_of(folder: &Folder, area: &GamingArea) -> Result<(Vec<LoadModule>, u64), CompileError> {
-    let modules = read_modules(folder, area)?;
+fn modules_of(folder: &Folder, manifest: &Manifest, area: &GamingArea) -> Result<(Vec<LoadModule>, u64), CompileError> {
+    let modules = read_modules(folder, manifest)?;
     let missing = area.grid.all().iter().find(|module| !modules.contains_key(module));
     if let Some(module) = missing {
         return Err(GroundError::Impossible {
@@ -261,10 +261,13 @@ fn built_residual(totals: &Totals) -> BuiltResidual {
 }
 
 /// All load modules by place, at their finest level, checked one by one as they are decoded.
-pub(crate) fn read_modules(folder: &Folder, area: &GamingArea) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
+pub(crate) fn read_modules(
+    folder: &Folder,
+    manifest: &Manifest,
+) -> Result<BTreeMap<ModuleId, LoadModule>, CompileError> {
     let mut all = BTreeMap::new();
-    for &tile in &area.tiles {
-        let (_, modules) = folder.read_modules(tile)?;
+    for record in &manifest.tiles {
+        let (_, modules) = folder.read_modules(manifest, record.tile())?;
         all.extend(modules.into_iter().map(|module| (module.id, module)));
     }
     Ok(all)

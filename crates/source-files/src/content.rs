@@ -86,6 +86,11 @@ impl FileState {
         Ok(Self { beside, ..Self::alone(path)? })
     }
 
+    /// The path, and those of the files beside it.
+    pub fn paths(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(self).chain(&self.beside).map(|state| state.path.as_path())
+    }
+
     fn alone(path: &Path) -> Result<Self, SourceError> {
         let data = regular(path)?;
         let (modified, place) = (modified(&data), place_of(&data));

@@ -11,22 +11,16 @@ use crate::lock::LOCK_NAME;
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
 use crate::{
     Area, AreaLevel, AreaOutlines, Building, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured,
-    Profile, Removals, TileModules, Work, encode_buildings, encode_curve, encode_level, encode_levels, encode_lines,
-    encode_measured, encode_outlines, encode_profile, encode_removals, encode_tile, json,
+    Profile, Removals, Report, TileModules, Work, encode_buildings, encode_curve, encode_level, encode_levels,
+    encode_lines, encode_measured, encode_outlines, encode_profile, encode_removals, encode_tile, json,
 };
 
 /// The folders of a database that stay.
 const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// What is written beside a finished build.
-const REPORTS: [&str; 7] = [
-    files::REPORT,
-    files::REPORT_HTML,
-    files::BREACHES,
-    files::BREACHES_CSV,
-    files::FEATURES,
-    files::FEATURES_GPKG,
-    files::OBJECTS,
-];
+fn reports() -> impl Iterator<Item = &'static str> {
+    [files::REPORT].into_iter().chain(files::BESIDE_REPORT)
+}
 /// Endings of the names that a build gives to files in those folders.
 const ENDINGS: [&str; 10] =
     [".tin", ".removed", ".slm", ".sums", ".curve", ".profile", ".lines", ".level", ".buildings", ".outlines"];
@@ -256,6 +250,20 @@ impl Database {
         self.publish(&self.folder.path(name), bytes)
     }
 
+    /// Publishes the report, which says of which `database.json` it is and lists the files `beside` it; those that an
+    /// earlier run left and that it does not list are removed.
+    ///
+    /// # Errors
+    /// As [`Database::write_tile`].
+    pub fn write_report(&self, report: &mut Report, manifest: &Manifest) -> Result<(), DatabaseError> {
+        let is_listed = |name: &&&str| report.files.contains_key(**name);
+        files::BESIDE_REPORT.iter().filter(|name| !is_listed(name)).try_for_each(|name| self.remove(name))?;
+        let of_database = manifest.encode(&self.folder.path(files::DATABASE))?;
+        report.files.insert(files::DATABASE.to_owned(), FileStamp::of(of_database.as_bytes()));
+        self.write_json(files::REPORT, report)?;
+        Ok(())
+    }
+
     /// Removes a file by its name inside the directory, if it is there.
     ///
     /// # Errors
@@ -298,7 +306,7 @@ impl Database {
         assert_eq!(manifest.state, ManifestState::Incomplete, "a build begins incomplete");
         // By this file a later build knows that the others are ours.
         self.write_manifest(manifest, Durability::Now)?;
-        REPORTS.iter().try_for_each(|name| self.remove(name))
+        reports().try_for_each(|name| self.remove(name))
     }
 
     /// Says that the build is complete, once every file it lists and every report is on the disk.
@@ -315,7 +323,7 @@ impl Database {
         if let Some(path) = paths.iter().find(|path| store.entry(path).is_err()) {
             return Err(DatabaseError::Missing { path: path.clone() });
         }
-        let reports = REPORTS.iter().map(|name| self.folder.path(name)).filter(|path| store.entry(path).is_ok());
+        let reports = reports().map(|name| self.folder.path(name)).filter(|path| store.entry(path).is_ok());
         let paths: Vec<PathBuf> = paths.iter().cloned().chain(reports).collect();
         let (dir, folders) = (self.folder.dir(), FOLDERS.map(|name| self.folder.path(name)));
         store.sync(dir, &paths, &folders).map_err(|source| DatabaseError::from_io("sync", dir, 0, source))?;
@@ -393,8 +401,8 @@ fn examine(folder: &Folder, area: &Area) -> Result<Option<Manifest>, DatabaseErr
 
 /// Refuses a directory whose `database.json` was ours and is damaged if a build would not make all that lies there.
 fn refuse_others(folder: &Folder) -> Result<(), DatabaseError> {
-    let ours = [LOCK_NAME, WORK, files::DATABASE];
-    let is_ours = |name: &str| [&ours[..], &FOLDERS, &REPORTS].concat().contains(&name) || is_temporary(name);
+    let ours = || [LOCK_NAME, WORK, files::DATABASE].into_iter().chain(FOLDERS).chain(reports());
+    let is_ours = |name: &str| ours().any(|our| our == name) || is_temporary(name);
     let names = folder.list(folder.dir())?.into_iter().map(|path| name_of(&path));
     let other = names.into_iter().find(|name| !is_ours(name));
     other.map_or(Ok(()), |name| {

@@ -194,6 +194,12 @@ pub enum DatabaseError {
         /// What is wrong with it.
         fault: TinFault,
     },
+    /// A sound file of a database, which is not the one that a build left there.
+    #[error("{}: found a file that is not of the build that database.json tells of", path.display())]
+    OtherBuild {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file that `database.json` does not list.
     #[error("{}: found a file that database.json does not list", path.display())]
     NotListed {
@@ -309,6 +315,7 @@ impl DatabaseError {
             Self::OtherVersion { .. } => "another version of tiefort wrote it; build into another folder with --out",
             Self::OtherArea { .. } => "the folder holds another gaming area; build into another one with --out",
             Self::Locked { .. } => "wait for the other run to end, or build into another folder with --out",
+            Self::OtherBuild { .. } => "`tiefort verify` tells more, and `tiefort build` of its job makes it again",
             Self::Missing { .. }
             | Self::NotOurFile { .. }
             | Self::WrongLength { .. }

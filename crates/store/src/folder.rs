@@ -147,9 +147,11 @@ impl Folder {
     /// What `report.json` says.
     ///
     /// # Errors
-    /// When it is missing or damaged.
+    /// When it is missing, damaged or of another build.
     pub fn report(&self) -> Result<Report, DatabaseError> {
-        self.read_json(files::REPORT).map_err(|error| self.without(error))
+        let report: Report = self.read_json(files::REPORT).map_err(|error| self.without(error))?;
+        self.check_of_build(&report.files)?;
+        Ok(report)
     }
 
     /// The TIN of `tile`, and what it was made from.
@@ -159,7 +161,7 @@ impl Folder {
     pub fn read_tile(&self, tile: TileId) -> Result<(Stamp, TileTin), DatabaseError> {
         let path = self.tile_path(tile);
         let (stamp, read) = tile_file::decode_tile(&path, &self.read(&path)?)?;
-        same_tile(path, read.tile, tile)?;
+        same_tile(&path, read.tile, tile)?;
         Ok((stamp, read))
     }
 
@@ -204,46 +206,71 @@ impl Folder {
     pub fn read_removals(&self, tile: TileId) -> Result<(Stamp, Removals), DatabaseError> {
         let path = self.removals_path(tile);
         let (stamp, read) = beside_tile::decode_removals(&path, &self.read(&path)?)?;
-        same_tile(path, read.tile, tile)?;
+        same_tile(&path, read.tile, tile)?;
         Ok((stamp, read))
     }
 
     /// The load modules of `tile` at every level, the finest first, each sound, and what holds for all of them.
     ///
     /// # Errors
-    /// When the file is missing, damaged or of another tile, or a load module is unsound.
-    pub fn read_levels(&self, tile: TileId) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
-        let path = self.modules_path(tile);
-        let (header, levels) = slm::decode_levels(&path, &self.read(&path)?)?;
-        same_tile(path, header.tile, tile)?;
-        Ok((header, levels))
+    /// When the file is missing or damaged, a load module is unsound, or the file is not the one `manifest` lists.
+    pub fn read_levels(
+        &self,
+        manifest: &Manifest,
+        tile: TileId,
+    ) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+        self.read_listed(manifest, tile, slm::decode_levels)
     }
 
     /// The load modules of `tile` at their finest level, each sound, and what holds for all of them.
     ///
     /// # Errors
-    /// When the file is missing, damaged or of another tile, or a load module is unsound.
-    pub fn read_modules(&self, tile: TileId) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
-        let path = self.modules_path(tile);
-        let (header, modules) = slm::decode_modules(&path, &self.read(&path)?)?;
-        same_tile(path, header.tile, tile)?;
-        Ok((header, modules))
+    /// As [`Folder::read_levels`].
+    pub fn read_modules(
+        &self,
+        manifest: &Manifest,
+        tile: TileId,
+    ) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
+        self.read_listed(manifest, tile, slm::decode_modules)
     }
 
     /// The load modules of `tile` that lie in `part` at every level, the finest first, each sound, and what holds for
     /// all of the tile. The others are not looked at.
     ///
     /// # Errors
-    /// When the file is missing or of another tile, or what is looked at is damaged or unsound.
+    /// As [`Folder::read_levels`].
     pub fn read_part(
         &self,
+        manifest: &Manifest,
         tile: TileId,
         part: ModuleRect,
     ) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+        self.read_listed(manifest, tile, |path, bytes| slm::decode_part(path, bytes, part))
+    }
+
+    /// What a load-module file holds. That of another database of the same area is as sound as the one `manifest`
+    /// lists, so bytes are compared, too.
+    fn read_listed<T>(
+        &self,
+        manifest: &Manifest,
+        tile: TileId,
+        decode: impl FnOnce(&Path, &[u8]) -> Result<(TileModules, T), DatabaseError>,
+    ) -> Result<(TileModules, T), DatabaseError> {
         let path = self.modules_path(tile);
-        let (header, levels) = slm::decode_part(&path, &self.read(&path)?, part)?;
-        same_tile(path, header.tile, tile)?;
-        Ok((header, levels))
+        let bytes = self.read(&path)?;
+        let (header, modules) = decode(&path, &bytes)?;
+        same_tile(&path, header.tile, tile)?;
+        is_listed(&path, &bytes, manifest, tile)?;
+        Ok((header, modules))
+    }
+
+    /// Whether the load-module file of `tile` is the one that `manifest` lists. Nothing is decoded.
+    ///
+    /// # Errors
+    /// When it is missing or another.
+    pub fn check_modules(&self, manifest: &Manifest, tile: TileId) -> Result<(), DatabaseError> {
+        let path = self.modules_path(tile);
+        is_listed(&path, &self.read(&path)?, manifest, tile)
     }
 
     /// What was measured of the load modules of `tile`, what those were made from, and the bytes that say so.
@@ -254,7 +281,7 @@ impl Folder {
         let path = self.measured_path(tile);
         let bytes = self.read(&path)?;
         let (stamp, read) = measured_file::decode_measured(&path, &bytes)?;
-        same_tile(path, read.tile, tile)?;
+        same_tile(&path, read.tile, tile)?;
         Ok((stamp, FileStamp::of(&bytes), read))
     }
 
@@ -318,7 +345,7 @@ impl Folder {
         let path = self.profile_path(tile);
         let bytes = self.read(&path)?;
         let (stamp, read) = beside_tile::decode_profile(&path, &bytes)?;
-        same_tile(path, read.tile, tile)?;
+        same_tile(&path, read.tile, tile)?;
         Ok((stamp, FileStamp::of(&bytes), read))
     }
 
@@ -330,7 +357,7 @@ impl Folder {
         let path = self.lines_path(tile);
         let bytes = self.read(&path)?;
         let (_, read) = beside_tile::decode_lines(&path, &bytes)?;
-        same_tile(path, read.tile, tile)?;
+        same_tile(&path, read.tile, tile)?;
         Ok((FileStamp::of(&bytes), read))
     }
 
@@ -352,7 +379,7 @@ impl Folder {
     pub fn read_curve(&self, tile: TileId) -> Result<(Stamp, GainCurve), DatabaseError> {
         let path = self.curve_path(tile);
         let (stamp, read) = beside_tile::decode_curve(&path, &self.read(&path)?)?;
-        same_tile(path, read.tile, tile)?;
+        same_tile(&path, read.tile, tile)?;
         Ok((stamp, read))
     }
 
@@ -388,7 +415,7 @@ impl Folder {
     /// # Errors
     /// When it is missing, or its length or content differs.
     pub fn check_file(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
-        check_stamp(path, &self.read(path)?, stamp)
+        check_stamp(path, &self.read(path)?, stamp, files::DATABASE)
     }
 
     /// All of one of its files.
@@ -405,6 +432,13 @@ impl Folder {
     }
 }
 
-fn same_tile(path: PathBuf, found: TileId, expected: TileId) -> Result<(), DatabaseError> {
+fn same_tile(path: &Path, found: TileId, expected: TileId) -> Result<(), DatabaseError> {
+    let path = path.to_path_buf();
     if found == expected { Ok(()) } else { Err(DatabaseError::OtherTile { path, found, expected }) }
+}
+
+fn is_listed(path: &Path, bytes: &[u8], manifest: &Manifest, tile: TileId) -> Result<(), DatabaseError> {
+    let listed = manifest.tile(tile).and_then(|record| record.slm);
+    let is_same = listed.is_some_and(|stamp| stamp.length == bytes.len() as u64 && stamp == FileStamp::of(bytes));
+    if is_same { Ok(()) } else { Err(DatabaseError::OtherBuild { path: path.to_path_buf() }) }
 }

@@ -24,6 +24,8 @@ pub mod files {
     pub const OUTLINES: &str = "survey/objects.outlines";
     /// What of it had no room.
     pub const OBJECTS: &str = "objects.geojson";
+    /// What a report lists of what is written beside it, where a build has it.
+    pub const BESIDE_REPORT: [&str; 6] = [REPORT_HTML, BREACHES, BREACHES_CSV, FEATURES, FEATURES_GPKG, OBJECTS];
     /// Buildings of the sources of features, which are drawn only.
     pub const BUILDINGS: &str = "survey/features.buildings";
 }

@@ -1,6 +1,6 @@
 //! Our page: HTML whose last line is a comment with a checksum of everything before it.
 //!
-//! The page is written last of all, after the report that lists the files beside it, so it must vouch for itself.
+//! One that `tiefort report` draws later and a person lays into the database is in no list, so it vouches for itself.
 
 use std::path::Path;
 

@@ -6,14 +6,16 @@ use crate::engine::{Entry, Store};
 
 use crate::frame::FRAME_BYTES;
 use crate::manifest::FileStamp;
+use crate::names::files;
 use crate::{DatabaseError, codec};
 
 /// Bytes of the longest file that is read: the longest payload and its frame.
 const FILE_BYTES_MAX: u64 = codec::PAYLOAD_BYTES_MAX + FRAME_BYTES as u64;
 
-/// Whether `bytes`, read from `path`, are those that `stamp` promises.
-pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp) -> Result<(), DatabaseError> {
-    let (path, section) = (path.to_path_buf(), "whole file, against database.json");
+/// Whether `bytes`, read from `path`, are those that `stamp` promises, which `list` has: `database.json` or the report.
+pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp, list: &str) -> Result<(), DatabaseError> {
+    let (path, is_of_report) = (path.to_path_buf(), list == files::REPORT);
+    let section = if is_of_report { "whole file, against report.json" } else { "whole file, against database.json" };
     let found = FileStamp::of(bytes);
     if found.length != stamp.length {
         return Err(DatabaseError::WrongLength { path, section, found: found.length, expected: stamp.length });

@@ -85,7 +85,7 @@ pub struct Report {
     /// What each tile took, where it was worked on in this run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tiles: Vec<ReportTile>,
-    /// Files written beside the report, and how they must look.
+    /// Files written beside the report, `database.json` among them, and how they must look.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub files: BTreeMap<String, FileStamp>,
 }

@@ -10,8 +10,8 @@ use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
 use crate::page::check_page;
 use crate::read::check_stamp;
 use crate::{
-    DatabaseError, FileStamp, Folder, Manifest, beside_tile, buildings_file, level_file, measured_file, outlines_file,
-    slm, tile_file,
+    DatabaseError, FileStamp, Folder, Manifest, ManifestState, beside_tile, buildings_file, level_file, measured_file,
+    outlines_file, slm, tile_file,
 };
 
 /// One file that is not as it should be.
@@ -44,7 +44,7 @@ impl Folder {
     }
 
     /// Reads every file that `manifest` lists: its sections, what they hold (TINs and load modules are walked for
-    /// cracks), and its hash; also the reports, where there are any. Files of ours that it does not list are named
+    /// cracks), and its hash; also the report and what it lists. Files of ours that no list has are named
     /// too. At most one finding per file, in the order of the manifest.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl Folder {
                 damage.push(Damage { path: path.clone(), error });
             }
         }
-        // They know times, so no manifest lists them.
+        // They know times, so the report lists them, and no manifest the report.
         damage.extend(self.damage_of_reports());
         let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
         for name in [TILES, MODULES, MEASURED, SURVEY] {
@@ -71,8 +71,8 @@ impl Folder {
         Ok(damage)
     }
 
-    /// Whether every file that `manifest` lists has the bytes it had, and so have the reports; and no file of ours lies
-    /// beside them.
+    /// Whether every file that `manifest` lists has the bytes it had, and so have the report and what it lists; and no
+    /// file of ours lies beside them.
     ///
     /// # Errors
     /// When a folder cannot be listed.
@@ -106,30 +106,47 @@ impl Folder {
             Some("removed") => drop(beside_tile::decode_removals(path, &bytes)?),
             _ => {}
         }
-        check_stamp(path, &bytes, stamp)
+        check_stamp(path, &bytes, stamp, files::DATABASE)
     }
 
-    /// Reports that are not as they were written: `report.json` by its own checksum, the breaches by what it says of
-    /// them, the page by its last line. One that is gone is no damage: a person may have taken it away.
+    /// The report, where it is not as it was written or of another build, and what it lists that is not as it says. A
+    /// page that it does not list may have been drawn later, and vouches for itself.
     fn damage_of_reports(&self) -> Vec<Damage> {
-        let (beside, report) = match self.read_json(files::REPORT) {
-            Ok(beside) => (beside, Ok(())),
-            Err(error) => (Beside::default(), Err(error)),
+        let found = |name: &str, error| Damage { path: self.path(name), error };
+        let report: Beside = match self.read_json(files::REPORT) {
+            Ok(report) => report,
+            Err(error) => return vec![found(files::REPORT, error)],
         };
-        let page = self.path(files::REPORT_HTML);
-        let page = self.read(&page).and_then(|bytes| check_page(&page, &bytes));
-        let listed = beside.files.iter().filter(|(name, _)| BREACHES.contains(&name.as_str()));
-        let breaches = listed.map(|(name, stamp)| (name.as_str(), self.check_file(&self.path(name), stamp)));
-        let found = |(name, checked)| match checked {
-            Ok(()) | Err(DatabaseError::Missing { .. }) => None,
-            Err(error) => Some(Damage { path: self.path(name), error }),
+        let check = |name: &'static str| {
+            let path = self.path(name);
+            match report.files.get(name) {
+                Some(stamp) => check_stamp(&path, &self.read(&path)?, stamp, files::REPORT),
+                None if name == files::REPORT_HTML => match self.read(&path) {
+                    Err(DatabaseError::Missing { .. }) => Ok(()),
+                    read => check_page(&path, &read?),
+                },
+                None => Ok(()),
+            }
         };
-        [(files::REPORT, report), (files::REPORT_HTML, page)].into_iter().chain(breaches).filter_map(found).collect()
+        let of_other = self.check_of_build(&report.files).err().map(|error| found(files::REPORT, error));
+        let beside = files::BESIDE_REPORT.into_iter();
+        of_other.into_iter().chain(beside.filter_map(|name| Some(found(name, check(name).err()?)))).collect()
+    }
+
+    /// Whether a report that lists these files is of the build that `database.json` tells of. While a build is under
+    /// way, its report may lie there before that file says so.
+    ///
+    /// # Errors
+    /// When it is of another build, or `database.json` cannot be read.
+    pub(crate) fn check_of_build(&self, listed: &BTreeMap<String, FileStamp>) -> Result<(), DatabaseError> {
+        let Some(stamp) = listed.get(files::DATABASE) else { return Ok(()) };
+        let is_same = self.check_file(&self.path(files::DATABASE), stamp).is_ok();
+        if is_same || self.manifest()?.state == ManifestState::Incomplete {
+            return Ok(());
+        }
+        Err(DatabaseError::OtherBuild { path: self.path(files::REPORT) })
     }
 }
-
-/// What a report may list: names, not paths, since a damaged or foreign report could name anything.
-const BREACHES: [&str; 2] = [files::BREACHES, files::BREACHES_CSV];
 
 /// What a report says of the files beside it.
 #[derive(Default, Deserialize)]

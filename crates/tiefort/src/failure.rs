@@ -126,9 +126,8 @@ impl Failure {
     pub fn of_compiler(error: &CompileError, signal: Option<u8>) -> Self {
         let cause = Cause::of_compiler(error);
         if cause == Cause::Stopped {
-            let again = || "run the same command again: it goes on where it stopped".to_owned();
-            let (hint, code) = (error.hint().unwrap_or_else(again), signal.unwrap_or(FAILED));
-            return Self { message: error.to_string(), hint: Some(hint), code, cause };
+            let code = signal.unwrap_or(FAILED);
+            return Self { message: error.to_string(), hint: error.hint(), code, cause };
         }
         let code = if error.is_transient() { TRY_LATER } else { FAILED };
         Self { message: error.to_string(), hint: error.hint(), code, cause }
@@ -137,6 +136,11 @@ impl Failure {
     /// With the exit code of the signal that came, if one did: then that is why.
     pub fn after(self, signal: Option<u8>) -> Self {
         Self { code: signal.unwrap_or(self.code), ..self }
+    }
+
+    /// With another hint, where it was asked to stop: what it kept, only the command knows.
+    pub fn hinted_if_stopped(self, hint: &str) -> Self {
+        if self.cause == Cause::Stopped { Self { hint: Some(hint.into()), ..self } } else { self }
     }
 
     /// With another hint, where the message holds `part`.
@@ -251,5 +255,15 @@ mod tests {
         assert_eq!(failure.code, 75);
         let failure = Failure::from(DatabaseError::Missing { path: "a.tdb".into() });
         assert_eq!(failure.code, 2);
+    }
+
+    #[test]
+    fn only_a_run_that_keeps_its_work_is_said_to_go_on() {
+        let stopped = CompileError::Stopped { stage: build::Stage::Refine, done: 1, total: 3 };
+        let failure = Failure::of_compiler(&stopped, Some(130));
+        assert!(!failure.hint().contains("go on") && failure.code == 130, "{failure}");
+        assert_eq!(failure.hinted_if_stopped("go on").hint(), "go on");
+        let other = Failure::new("a", "b").hinted_if_stopped("go on");
+        assert_eq!(other.hint(), "b");
     }
 }

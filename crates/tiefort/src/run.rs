@@ -19,6 +19,9 @@ use crate::progress::{Listener, Show};
 use crate::signals::{self, Signals};
 use crate::{events, files, terminal};
 
+/// What to do after a run was stopped that publishes what is done.
+const GO_ON: &str = "run the same command again to go on from here";
+
 /// A run of the compiler on a job, as a person follows it.
 #[derive(Debug)]
 pub struct Run<'a> {
@@ -131,13 +134,13 @@ impl<'a> Run<'a> {
             // Others may have what is given up at once; if that fails, the lease expires.
             let held = lease.lock().unwrap_or_else(PoisonError::into_inner).take();
             let _ = held.map(Lease::give_up);
-            signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words())
+            signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words(), GO_ON)
         });
         let worked = work(&mut listener);
         listener.finish();
         // From here on this thread says how the process ends.
         self.signals.tell_once(|| {});
-        worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()))
+        worked.map_err(|error| Failure::of_compiler(&error, self.signals.exit_code()).hinted_if_stopped(GO_ON))
     }
 
     /// Runs `work` while someone listens, then shows what came of it.

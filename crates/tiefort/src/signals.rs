@@ -153,8 +153,8 @@ fn held_back_within(patience: Duration) -> Option<Writing> {
     }
 }
 
-/// Says that the process is being ended where it is.
-pub fn stopped(place: &str) -> Failure {
+/// Says that the process is being ended where it is, and what to do then.
+pub fn stopped(place: &str, hint: &str) -> Failure {
     terminal::clear_line();
-    Failure::new(place, "run the same command again to go on from here")
+    Failure::new(place, hint)
 }

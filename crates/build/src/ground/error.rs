@@ -76,7 +76,7 @@ impl GroundError {
             GroundError::Panicked { .. } => {
                 Some("this is a fault of the compiler; what was published before is intact".to_owned())
             }
-            GroundError::Stopped { .. } => Some("run the same command again to go on from here".to_owned()),
+            GroundError::Stopped { .. } => Some("run the same command again; nothing was left half-written".to_owned()),
             GroundError::NoThread { .. } => Some("use fewer --workers".to_owned()),
         }
     }

@@ -107,8 +107,7 @@ impl Product {
         };
         let meets = |tile: &TileId| area.tiling.modules(*tile, area.grid).intersection(part).is_some();
         let tiles: Vec<TileId> = area.tiles.iter().copied().filter(meets).collect();
-        let read =
-            |_: usize, &tile: &TileId| read_tile(folder, area, ground.as_ref().map(|(ground, _)| ground), part, tile);
+        let read = |_: usize, &tile: &TileId| read_tile(opened, ground.as_ref().map(|(ground, _)| ground), part, tile);
         let pieces = schedule::for_each_independent(&tiles, &workers, &stop, read)
             .map_err(|error| GroundError::from_schedule(&tiles, error))?;
         let (modules, pieces): (Vec<_>, Vec<_>) = pieces.into_iter().map(|piece| (piece.modules, piece.ground)).unzip();
@@ -131,12 +130,12 @@ impl Product {
     /// # Errors
     /// When one is missing or damaged.
     pub fn modules_in(opened: &Opened, part: ModuleRect) -> Result<Vec<LoadModule>, ProductError> {
-        let Opened { folder, area, .. } = opened;
+        let Opened { folder, manifest, area, .. } = opened;
         let [low, high] = [part.south_west(), ModuleId { row: part.north - 1, col: part.east - 1 }]
             .map(|corner| area.tiling.tile_of_module(corner, area.grid));
         let mut modules = Vec::with_capacity(part.count());
         for (row, col) in (low.row..=high.row).flat_map(|row| (low.col..=high.col).map(move |col| (row, col))) {
-            modules.append(&mut folder.read_part(TileId { row, col }, part)?.1[0]);
+            modules.append(&mut folder.read_part(manifest, TileId { row, col }, part)?.1[0]);
         }
         modules.sort_by_key(|module| module.id);
         check_complete(&modules, part, folder)?;
@@ -241,14 +240,13 @@ struct Piece {
 }
 
 fn read_tile(
-    folder: &Folder,
-    area: &GamingArea,
+    Opened { folder, manifest, area, .. }: &Opened,
     ground: Option<&Ground>,
     part: ModuleRect,
     tile: TileId,
 ) -> Result<TilePiece, ProductError> {
     let inside = area.tiling.modules(tile, area.grid).intersection(part).expect("only tiles of the part are read");
-    let modules = folder.read_part(tile, part)?.1.swap_remove(0);
+    let modules = folder.read_part(manifest, tile, part)?.1.swap_remove(0);
     let ground = match ground {
         Some(ground) => {
             let window = ground.window(area.grid.posts_of_rect(inside))?;

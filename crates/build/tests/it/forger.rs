@@ -32,7 +32,7 @@ impl Forged {
         Self {
             report: folder.report().unwrap(),
             tins: tiles.iter().map(|&tile| folder.read_tile(tile).unwrap()).collect(),
-            modules: tiles.iter().map(|&tile| folder.read_levels(tile).unwrap()).collect(),
+            modules: tiles.iter().map(|&tile| folder.read_levels(&manifest, tile).unwrap()).collect(),
             measured: tiles
                 .iter()
                 .map(|&tile| folder.read_measured(tile).unwrap())
@@ -85,7 +85,10 @@ impl Forged {
         if let Some(features) = &mut self.features {
             features.seal(&folder, &mut self.manifest);
         }
-        database.write_json(files::REPORT, &self.report).unwrap();
+        for (name, stamp) in &mut self.report.files {
+            *stamp = folder.stamp_file(&folder.path(name)).unwrap();
+        }
+        database.write_report(&mut self.report, &self.manifest).unwrap();
         database.finish(&self.manifest).unwrap();
     }
 

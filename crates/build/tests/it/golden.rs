@@ -39,10 +39,11 @@ fn found() -> String {
         drop(scene.build("area", 2));
         let mut builder = FingerprintBuilder::new("golden");
         let folder = Folder::new(scene.path("area"));
-        for record in folder.manifest().unwrap().tiles {
+        let manifest = folder.manifest().unwrap();
+        for record in &manifest.tiles {
             let tile = record.tile();
             let (_, tin) = folder.read_tile(tile).unwrap();
-            let (header, levels) = folder.read_levels(tile).unwrap();
+            let (header, levels) = folder.read_levels(&manifest, tile).unwrap();
             let header = TileModules { fingerprint: FROM.fingerprint, ..header };
             builder = builder.bytes(&encode_tile(&FROM, &tin)).bytes(&encode_levels(&header, &levels));
             if record.removed.is_some() {

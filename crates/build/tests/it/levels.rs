@@ -35,7 +35,8 @@ fn levels_of(scene: &Scene, folder: &str) -> Vec<Vec<LoadModule>> {
     let mut levels: Vec<Vec<LoadModule>> = vec![Vec::new(); 1 + SHARES.len()];
     for row in 0..2 {
         for col in 0..2 {
-            let (_, own) = Folder::new(scene.path(folder)).read_levels(tile(row, col)).unwrap();
+            let folder = Folder::new(scene.path(folder));
+            let (_, own) = folder.read_levels(&folder.manifest().unwrap(), tile(row, col)).unwrap();
             assert_eq!(own.len(), levels.len());
             levels.iter_mut().zip(own).for_each(|(level, own)| level.extend(own));
         }
@@ -205,9 +206,9 @@ fn levels_are_added_to_and_taken_from_an_area_without_refining_it() {
     let finest: Vec<LoadModule> = levels_of(&scene, "fresh").swap_remove(0);
     drop(without.build("area", 2));
     assert_same(&before, &without.product("area"), "levels taken away");
-    let mut again = Vec::new();
+    let (mut again, folder) = (Vec::new(), Folder::new(without.path("area")));
     for at in [tile(0, 0), tile(0, 1), tile(1, 0), tile(1, 1)] {
-        again.extend(Folder::new(without.path("area")).read_modules(at).unwrap().1);
+        again.extend(folder.read_modules(&folder.manifest().unwrap(), at).unwrap().1);
     }
     again.sort_by_key(|module| module.id);
     assert_eq!(again, finest);
@@ -218,11 +219,15 @@ fn verify_finds_levels_that_do_not_fit_together_and_those_that_are_not_in_the_jo
     let scene = Scene::new(&words("", "", "own"));
     let built = scene.build("area", 2);
     let manifest = Folder::new(scene.path("area")).manifest().unwrap();
+    let finish = |manifest: &store::Manifest| {
+        built.database.write_report(&mut built.report.clone(), manifest).unwrap();
+        built.database.finish(manifest).unwrap();
+    };
     let problems = |before: &str, after: &str| {
         let mut told = manifest.clone();
         told.job = told.job.replace(before, after);
         assert_ne!(told.job, manifest.job);
-        built.database.finish(&told).unwrap();
+        finish(&told);
         inspect::verify(&scene.path("area"), None).unwrap().problems
     };
     let torn = problems("border = \"own\"", "border = \"full\"");
@@ -232,6 +237,6 @@ fn verify_finds_levels_that_do_not_fit_together_and_those_that_are_not_in_the_jo
     assert_eq!(missing[0], "level 3: load module 0,0: missing");
     let more = problems(", { inner_share = 0.2 }", "");
     assert_eq!(more, ["load modules: 3 levels in a file, the job has 2"]);
-    built.database.finish(&manifest).unwrap();
+    finish(&manifest);
     scene.verify("area");
 }

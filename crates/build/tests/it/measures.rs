@@ -36,8 +36,9 @@ fn welded(scene: &Scene, words: &Words) -> Tin {
     let side = words.grid().side_cells * 8;
     let (mut vertices, mut triangles, mut places) = (Vec::new(), Vec::new(), BTreeMap::new());
     let tiles = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(row, col)| tile(row, col));
-    let mut modules: Vec<_> =
-        tiles.iter().flat_map(|&tile| Folder::new(scene.path("area")).read_modules(tile).unwrap().1).collect();
+    let folder = Folder::new(scene.path("area"));
+    let manifest = folder.manifest().unwrap();
+    let mut modules: Vec<_> = tiles.iter().flat_map(|&tile| folder.read_modules(&manifest, tile).unwrap().1).collect();
     modules.sort_by_key(|module| module.id);
     for module in modules {
         let own: Vec<u32> = module

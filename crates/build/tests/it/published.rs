@@ -27,9 +27,11 @@ impl<F: FnMut() + Send> Progress for At<F> {
     }
 }
 
-/// A report without what times and machines decide.
+/// A report without what times and machines decide: the page tells times, too.
 fn timeless(report: &Report) -> Report {
-    Report { stages: Vec::new(), tiles: Vec::new(), ..report.clone() }
+    let mut report = Report { stages: Vec::new(), tiles: Vec::new(), ..report.clone() };
+    report.files.remove(files::REPORT_HTML);
+    report
 }
 
 /// The report of a database that is complete, with everything that a run leaves in it and nothing else.
@@ -58,7 +60,7 @@ fn a_build_by_the_library_alone_leaves_a_database_with_everything_in_it() {
     let scene = scene();
     let built = build_with_page(&scene, "area", &mut Silent);
     let report = complete(&scene, "area", true);
-    assert_eq!(timeless(&report), Report { files: report.files.clone(), ..timeless(&built.report) });
+    assert_eq!(timeless(&report), timeless(&built.report));
     let names = |report: &Report| report.stages.iter().map(|row| row.name.clone()).collect::<Vec<_>>();
     let stages = ["read", "survey", "allocate", "refine", "assemble", "publish"].map(str::to_owned).to_vec();
     let and = |more: &[&str]| [&stages[..], &more.iter().map(|&name| name.to_owned()).collect::<Vec<_>>()].concat();
@@ -118,8 +120,8 @@ fn a_build_that_ends_at_any_step_of_publishing_is_whole_after_the_next() {
     // Where it ended, and what is there then.
     let steps = [
         (Event::Enter(Stage::Publish, 0), false, false),
-        (Event::Enter(Stage::Page, 0), true, false),
-        (Event::Leave(Stage::Page), true, true),
+        (Event::Enter(Stage::Page, 0), false, false),
+        (Event::Leave(Stage::Page), false, true),
     ];
     for (event, has_report, has_page) in steps {
         for units in [false, true] {

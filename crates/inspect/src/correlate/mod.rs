@@ -56,7 +56,8 @@ pub fn correlate(
         let hint = "name the terrain database first; what it is compared with may be a raster";
         return Err(impossible(key, found, "the folder of a terrain database", hint));
     }
-    let (a, b) = (Surface::open(first)?, Surface::open(second)?);
+    let workers = Workers::new(workers);
+    let (a, b) = (Surface::open(first, &workers, stop)?, Surface::open(second, &workers, stop)?);
     let mut notes = check_systems(&a.facts, &b.facts, request.allow_datums)?;
     let common_m = common_area(&a.facts, &b.facts)?;
     let surfaces = [a.facts.clone(), b.facts.clone()];
@@ -66,7 +67,7 @@ pub fn correlate(
         notes.push("lines of sight go over the ground alone: only one of both has objects".into());
     }
     let apart_m = larger_spacing_m(&surfaces);
-    let (workers, reach_m) = (Workers::new(workers), request.range_m.max(18.0 * apart_m));
+    let reach_m = request.range_m.max(18.0 * apart_m);
     let mut common = Common::new((&a, &b), common_m, reach_m, (&workers, stop, tell))?;
     let places = draw_places(&mut common, plan.samples, request.seed, apart_m)?;
     let pairs = draw_pairs(&mut common, plan.samples, request, standing)?;

@@ -69,13 +69,16 @@ impl Surface {
     /// Opens a terrain database, which is a folder, or a raster of heights.
     ///
     /// # Errors
-    /// When it is missing, unfinished or damaged, or not in metres.
-    pub fn open(path: &Path) -> Result<Self, CompileError> {
-        if path.is_dir() { Self::database(path) } else { Self::raster(path) }
+    /// When it is missing, unfinished or damaged, holds load modules of another build, or is not in metres.
+    pub fn open(path: &Path, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
+        if path.is_dir() { Self::database(path, workers, stop) } else { Self::raster(path) }
     }
 
-    fn database(path: &Path) -> Result<Self, CompileError> {
+    fn database(path: &Path, workers: &Workers, stop: &AtomicBool) -> Result<Self, CompileError> {
         let Opened { folder, manifest, job, area } = Opened::open(path)?;
+        // The certificate names the load modules by the list that holds their fingerprints.
+        let check = |_: usize, &tile: &TileId| Ok(folder.check_modules(&manifest, tile)?);
+        schedule::for_each_independent(&area.tiles, workers, stop, check).map_err(ended)?;
         let modules = Area::open(folder.dir(), Keep::OnDisk).map_err(|error| damaged(path, error))?;
         let (frame, [west, south]) = (modules.frame(), modules.frame().origin_m);
         let [wide, high] = [frame.cols, frame.rows].map(|count| f64::from(count) * frame.side_m());

@@ -115,7 +115,7 @@ pub(crate) fn check(
         )
     }));
     for (name, read) in [(files::BREACHES, geojson as Reading), (files::BREACHES_CSV, csv)] {
-        // A person may have taken it away; one that lies there has the bytes that the report says.
+        // Those that a report lists are there: their bytes were looked at.
         let Ok(text) = folder.read_text(name) else { continue };
         if report.files.contains_key(name)
             && !read(&text).into_iter().eq(report.breaches.iter().map(exceeded_of).map(Some))

@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::*;
-use crate::{TileState, samples};
+use crate::{Report, TileState, samples};
 
 fn stamped(manifest: &mut Manifest, database: &Database) {
     let record = manifest.tile_mut(samples::TILE).unwrap();
@@ -23,6 +23,7 @@ fn build(dir: &Path) -> Manifest {
     let allocation = database.write_json(files::ALLOCATION, &std::collections::BTreeMap::from([("n", 1)])).unwrap();
     manifest.files.insert(files::ALLOCATION.into(), allocation);
     manifest.state = ManifestState::Complete;
+    database.write_report(&mut Report::default(), &manifest).unwrap();
     database.finish(&manifest).unwrap();
     manifest
 }
@@ -37,8 +38,8 @@ fn what_was_written_is_read_and_verified() {
     assert_eq!(read.read_tile(samples::TILE).unwrap(), (samples::stamp(), samples::tile()));
     assert_eq!(read.tile_stamp(samples::TILE).unwrap(), Some(samples::stamp()));
     assert_eq!(read.tile_stamp(terrain::TileId { row: 5, col: 5 }).unwrap(), None);
-    assert_eq!(read.read_modules(samples::TILE).unwrap(), (samples::tile_modules(), samples::modules()));
-    assert_eq!(read.read_levels(samples::TILE).unwrap(), (samples::tile_modules(), samples::levels()));
+    assert_eq!(read.read_modules(&manifest, samples::TILE).unwrap(), (samples::tile_modules(), samples::modules()));
+    assert_eq!(read.read_levels(&manifest, samples::TILE).unwrap(), (samples::tile_modules(), samples::levels()));
     assert_eq!(read.read_curve(samples::TILE).unwrap(), (samples::stamp(), samples::curve()));
     assert!(read.verify(&manifest).unwrap().is_empty());
 }

@@ -183,7 +183,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let (clock, estimate) = (SystemClock::start(), Estimate::of_one_stage(Stage::Refine));
     let mut listener = Listener::start(show, arguments.tiles.unwrap_or((1, 1)), request.workers, estimate, clock);
     let place = listener.place();
-    signals.end_in_time(move || signals::stopped(&place.lock().unwrap_or_else(PoisonError::into_inner).words()));
+    signals.end_in_time(move || {
+        let words = place.lock().unwrap_or_else(PoisonError::into_inner).words();
+        signals::stopped(&words, "run the same command again; nothing was left half-written")
+    });
     let levels: Vec<usize> = arguments.levels.iter().map(|&points| points as usize).collect();
     let mut watched = Stopwatch::start(&clock, &mut listener);
     let meshed = match levels.is_empty() {

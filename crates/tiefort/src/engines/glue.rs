@@ -2,12 +2,13 @@
 //!
 //! What the tiles of a job cost is as a build of it measured, or as forecast.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use build::ground::GamingArea;
 use build::{CompileError, Costs, ORDER, Plan, Stage, TileCosts, Unit, needs, units};
-use job::{DemSource, Job};
+use job::Job;
+use source_files::FileState;
 use store::{Folder, Report};
 use terrain::TileId;
 
@@ -27,8 +28,8 @@ pub struct Glue {
     pub job: PathBuf,
     /// Folder of the database.
     pub out: PathBuf,
-    /// Files that the job reads.
-    pub sources: Vec<PathBuf>,
+    /// Every file that the job reads, once.
+    pub sources: BTreeSet<PathBuf>,
     /// Every task, each after those it waits for.
     pub tasks: Vec<Task>,
     /// Rows and columns of tiles.
@@ -73,12 +74,8 @@ impl Glue {
         let out = out.unwrap_or(&default);
         let absolute = |path: &Path| std::path::absolute(path).map_err(|error| Failure::output(path, &error));
         let program = program::path().map_err(|error| Failure::output(Path::new("tiefort"), &error))?;
-        let sources = match &job.dem.source {
-            DemSource::Files { files, .. } => {
-                files.iter().map(|file| absolute(&file.path)).collect::<Result<_, _>>()?
-            }
-            DemSource::Sample { .. } => Vec::new(),
-        };
+        let states = build::ground::states(job).map_err(CompileError::from)?;
+        let sources = states.iter().flat_map(FileState::paths).map(absolute).collect::<Result<_, _>>()?;
         let area = GamingArea::new(job).map_err(CompileError::from)?;
         let costs = costs_of(job, plan, out);
         let total_s: f64 = costs.tiles.iter().map(|tile| tile.refine_s).sum();

@@ -1,6 +1,6 @@
 //! An Indexed Job for Kubernetes: workers that share a volume. No task is named, each takes what is ready.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::glue::{Glue, literal, shell_word};
 use crate::failure::Failure;
@@ -77,8 +77,10 @@ spec:
 
 /// The innermost folder in which job, sources and database lie.
 fn common_folder(glue: &Glue) -> Result<PathBuf, Failure> {
-    let mut folder = glue.job.parent().unwrap_or(Path::new("/"));
-    for path in glue.sources.iter().chain([&glue.out]) {
+    let plain = |path: &PathBuf| without_steps_up(path);
+    let job = plain(&glue.job);
+    let mut folder = job.parent().unwrap_or(Path::new("/"));
+    for path in glue.sources.iter().chain([&glue.out]).map(plain) {
         folder = folder.ancestors().find(|folder| path.starts_with(folder)).unwrap_or(Path::new("/"));
     }
     if folder.parent().is_none() {
@@ -89,6 +91,18 @@ fn common_folder(glue: &Glue) -> Result<PathBuf, Failure> {
         return Err(Failure::new(message, "put the job and its sources beside the folder that --out names"));
     }
     Ok(folder.to_path_buf())
+}
+
+/// The same place without `..`: `/jobs/../dem` lies in `/dem`, not in `/jobs`.
+fn without_steps_up(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut place, part| {
+        if part == Component::ParentDir {
+            place.pop();
+        } else {
+            place.push(part);
+        }
+        place
+    })
 }
 
 /// An area's name as Kubernetes has names: small letters, digits and hyphens.
@@ -120,6 +134,8 @@ mod tests {
         let all = glue("/share/jobs/a.toml", &["/share/dem/1.tif"], "/share/a.tdb");
         assert_eq!(common_folder(&all).unwrap(), Path::new("/share"));
         assert_eq!(common_folder(&glue("/share/a.toml", &[], "/share/a.tdb")).unwrap(), Path::new("/share"));
+        let beside = glue("/share/jobs/a.toml", &["/share/jobs/../dem/1.tif"], "/share/jobs/a.tdb");
+        assert_eq!(common_folder(&beside).unwrap(), Path::new("/share"));
         assert!(kubernetes(&glue("/home/a.toml", &[], "/share/a.tdb")).is_err());
         let text = kubernetes(&all).unwrap();
         for part in ["completions: 4", "mountPath: \"/share\"", "name: tiefort-fort-irwin-2\n", "memory: 189Mi"] {

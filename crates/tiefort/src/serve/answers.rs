@@ -306,7 +306,7 @@ fn one_module(snapshot: &Snapshot, of_tile: &TileModulesFile, id: ModuleId, head
     if files::is_known(headers, &tag) {
         return Ok(files::known(&tag));
     }
-    let read = Folder::new(&snapshot.contents.folder).read_levels(of_tile.tile);
+    let read = Folder::new(&snapshot.contents.folder).read_levels(&snapshot.contents.manifest, of_tile.tile);
     let (header, levels) = read.map_err(|error| Refusal::of(Failure::from(error)))?;
     let bytes: Bytes = exports::module_file(&header, &levels, id).ok_or_else(Refusal::fault)?.into();
     let length = bytes.len() as u64;

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use axum::body::Bytes;
 use build::product::{Product, ProductGround, Wanted, WantedGround, water};
-use job::Choice;
+use job::{Choice, Job};
 use load_module_reader::{Area, Keep};
 use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect, named_class_color};
@@ -35,6 +35,8 @@ pub struct Viewed {
     pub overview: Bytes,
     /// Roads and streams that have no triangles of their own; `None` where load modules have lines.
     pub lines: Option<Lines>,
+    /// Classes of ground that is a river or a lake.
+    pub waters: Vec<u8>,
     /// Roads and streams that are seen before load modules come.
     pub far_lines: Bytes,
     /// Buildings that are drawn only; none where load modules have objects.
@@ -53,7 +55,8 @@ impl Viewed {
         let product = Product::read(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
         let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
         let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
-        let mut overview = Overview::read(&area).map_err(damaged)?;
+        let waters = waters(&product.job);
+        let mut overview = Overview::read(&area, &waters).map_err(damaged)?;
         let level = product.features.as_ref().map(|(level, _)| level);
         let in_modules = level.is_some() && VERSION_WITH_LINES <= product.job.modules.format;
         let lines = (!in_modules).then(|| level.map(|level| Lines::of(level, area.frame())).unwrap_or_default());
@@ -68,12 +71,20 @@ impl Viewed {
             description: description(&product, &area, &overview, !far_lines.is_empty(), buildings.count()),
             overview: overview.bytes().into(),
             lines,
+            waters,
             far_lines,
             buildings,
             ground: OnceLock::new(),
             area,
         })
     }
+}
+
+/// Classes of ground that is a river or a lake: those named so, and that of water.
+fn waters(job: &Job) -> Vec<u8> {
+    let is_named = |name: &String| ["lake", "river"].contains(&name.as_str());
+    let named = (0..).zip(job.class_names()).filter(|(_, name)| is_named(name)).map(|(number, _)| number);
+    named.chain(water(job)).collect()
 }
 
 fn description(product: &Product, area: &Area, overview: &Overview, has_lines: bool, buildings: usize) -> String {

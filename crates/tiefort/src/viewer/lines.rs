@@ -6,7 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use load_module_reader::{Area, AreaFrame, Block, Line, LineKind, LineStorey, Module, QUANTA_PER_METRE, Vertex};
+use load_module_reader::{
+    Area, AreaFrame, Block, Line, LineKind, LineStorey, LoadedGround, Module, QUANTA_PER_METRE, Vertex,
+};
 use store::{AreaLevel, FeatureLine};
 use terrain::Role;
 
@@ -71,8 +73,22 @@ fn bytes<'a>(edges: impl IntoIterator<Item = &'a Edge>) -> Vec<u8> {
     out
 }
 
-/// The edges of a load module's lines that are drawn: of all that is kept, but for tunnels and breaklines.
-pub fn edges_of(module: &Module, side_m: f64) -> impl Iterator<Item = Edge> {
+/// The edges of the lines of loaded load modules that are drawn: of all that is kept, but for tunnels, breaklines, and
+/// channels on ground of the classes `waters`, which is seen as water without them.
+pub fn edges_of<'a>(ground: &'a LoadedGround, waters: &'a [u8]) -> impl Iterator<Item = Edge> + 'a {
+    let [east, north] = ground.frame().origin_m;
+    let is_seen = move |kind: LineKind, Edge { ends_m: [a, b], .. }: &Edge| {
+        let middle = [east + f64::midpoint(a[0], b[0]), north + f64::midpoint(a[1], b[1])];
+        let on_water = || ground.sample(middle).is_some_and(|sample| waters.contains(&sample.class));
+        kind != LineKind::Channel || !on_water()
+    };
+    let modules = ground.modules().iter();
+    let edges = modules.flat_map(|module| edges_of_module(module.module(), ground.frame().side_m()));
+    edges.filter(move |(kind, edge)| is_seen(*kind, edge)).map(|(_, edge)| edge)
+}
+
+/// Those of a load module, with the kinds of their lines.
+fn edges_of_module(module: &Module, side_m: f64) -> impl Iterator<Item = (LineKind, Edge)> {
     let is_drawn = |line: &&Line| line.is_kept && line.storey != LineStorey::Tunnel && line.kind != LineKind::Breakline;
     let metres = |quanta: i64| quanta as f64 / f64::from(QUANTA_PER_METRE);
     let corner = [module.col, module.row].map(|number| f64::from(number) * side_m);
@@ -80,25 +96,23 @@ pub fn edges_of(module: &Module, side_m: f64) -> impl Iterator<Item = Edge> {
         [corner[0] + metres(vertex.x.into()), corner[1] + metres(vertex.y.into()), metres(vertex.z.into())]
     };
     module.lines.iter().filter(is_drawn).flat_map(move |line| {
-        line.vertices.windows(2).map(move |ends| Edge {
-            module: (module.row, module.col),
-            class: line.class.into(),
-            width_m: metres(line.width.into()),
-            ends_m: [ends[0], ends[1]].map(place),
+        line.vertices.windows(2).map(move |ends| {
+            let ends_m = [ends[0], ends[1]].map(place);
+            let (class, width_m) = (line.class.into(), metres(line.width.into()));
+            (line.kind, Edge { module: (module.row, module.col), class, width_m, ends_m })
         })
     })
 }
 
-/// The lines of load modules in a block.
+/// The lines of load modules in a block, on ground of which the classes `waters` are water.
 ///
 /// # Errors
 /// In words, when a load module cannot be read.
-pub fn of_modules(area: &Area, block: Block) -> Result<Vec<u8>, String> {
+pub fn of_modules(area: &Area, block: Block, waters: &[u8]) -> Result<Vec<u8>, String> {
     let ground = area.load(block).map_err(|error| error.to_string())?;
-    let modules = ground.modules().iter();
-    let edges: Vec<Edge> =
-        modules.flat_map(|module| edges_of(module.module(), area.frame().side_m()).collect::<Vec<_>>()).collect();
-    Ok(bytes(&edges))
+    let mut out = Vec::new();
+    edges_of(&ground, waters).for_each(|edge| edge.write(&mut out));
+    Ok(out)
 }
 
 /// The lines of an area by load module, row and column.

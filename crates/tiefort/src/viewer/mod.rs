@@ -106,7 +106,7 @@ async fn far_lines(State(viewed): State<Arc<Viewed>>) -> Response {
 async fn lines(State(viewed): State<Arc<Viewed>>, UrlPath(sides): UrlPath<[u32; 4]>) -> Response {
     let read = |viewed: &Viewed, block| match &viewed.lines {
         Some(lines) => Ok(lines.bytes(block)),
-        None => lines::of_modules(&viewed.area, block),
+        None => lines::of_modules(&viewed.area, block, &viewed.waters),
     };
     answer(sides, viewed, read).await
 }

@@ -29,11 +29,11 @@ pub struct Overview {
 }
 
 impl Overview {
-    /// Reads every load module, row by row.
+    /// Reads every load module, row by row; ground of the classes `waters` is water.
     ///
     /// # Errors
     /// When one is damaged or missing.
-    pub fn read(area: &Area) -> Result<Self, ReadError> {
+    pub fn read(area: &Area, waters: &[u8]) -> Result<Self, ReadError> {
         let (rows, cols) = (area.frame().rows, area.frame().cols);
         let heights = |steps: &u64| (u64::from(rows) * steps + 1) * (u64::from(cols) * steps + 1);
         let steps = [4, 2].into_iter().find(|steps| heights(steps) <= HEIGHTS_MAX).unwrap_or(1) as u32;
@@ -47,25 +47,25 @@ impl Overview {
             figures: Vec::new(),
         };
         for row in 0..rows {
-            overview.add_row(area, row, row + 1 == rows)?;
+            overview.add_row(area, row, waters)?;
         }
         Ok(overview)
     }
 
-    fn add_row(&mut self, area: &Area, row: u32, is_last: bool) -> Result<(), ReadError> {
+    fn add_row(&mut self, area: &Area, row: u32, waters: &[u8]) -> Result<(), ReadError> {
         let frame = area.frame();
         let ground = area.load(Block { south: row, west: 0, north: row + 1, east: frame.cols })?;
+        self.lines.add(edges_of(&ground, waters));
         for module in ground.modules() {
             let module = module.module();
             self.add_figures(module);
-            self.lines.add(edges_of(module, frame.side_m()));
             let prisms = module.objects.prisms.iter().map(|prism| (prism.kind, prism.id));
             for (kind, id) in prisms.chain(module.objects.canopies.iter().map(|canopy| (canopy.kind, canopy.id))) {
                 self.objects.entry(kind).or_default().insert(id);
             }
         }
         let step_m = frame.side_m() / f64::from(self.steps);
-        for line in 0..self.steps + u32::from(is_last) {
+        for line in 0..self.steps + u32::from(row + 1 == frame.rows) {
             let north = frame.origin_m[1] + f64::from(row * self.steps + line) * step_m;
             let places =
                 (0..=frame.cols * self.steps).map(|step| [frame.origin_m[0] + f64::from(step) * step_m, north]);

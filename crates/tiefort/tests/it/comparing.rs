@@ -199,3 +199,27 @@ fn what_a_method_makes_is_improved_in_a_row_of_its_own() {
     let wrong = |start: &str| scene.run_to(2, &[&compare[..], &["--start", start]].concat()).stderr;
     assert!(wrong("highlow:9").contains("highlow alone") && wrong("vip").contains("vip:1000"));
 }
+
+#[test]
+fn load_modules_of_another_build_are_refused_until_a_build_makes_them_again() {
+    let scene = Scene::built();
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    fs::write(scene.path("other.toml"), job.replace("seed = 1", "seed = 2")).unwrap();
+    scene.run_to(0, &["build", "other.toml", "--out", "other.tdb", "--quiet", "--no-html"]);
+    let name = "modules/r01c01.slm";
+    fs::copy(scene.path("other.tdb").join(name), scene.path("small.tdb").join(name)).unwrap();
+    for arguments in [
+        &["export", "small.tdb", "--format", "obj", "--out", "a.obj"][..],
+        &["export", "small.tdb", "--format", "obj", "--out", "a.obj", "--modules", "7,7"],
+        &["render", "small.tdb", "--view", "relief", "--out", "a.png"],
+        &["fidelity", "small.tdb"],
+        &["correlate", "small.tdb", "other.tdb"],
+        &["diff", "small.tdb", "other.tdb"],
+    ] {
+        scene.refuses(arguments, &[name, "not of the build that database.json tells of"]);
+    }
+    scene.run_to(2, &["tile", "job.toml", "0,0", "--out", "small.tdb", "--quiet"]).check_error(&[name]);
+    scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+    scene.run_to(0, &["verify", "small.tdb"]);
+    scene.run_to(0, &["correlate", "small.tdb", "small.tdb"]);
+}

@@ -211,6 +211,25 @@ fn plan_tells_rules_that_match_nothing_and_features_that_all_lie_outside() {
 }
 
 #[test]
+fn engines_know_every_file_that_a_job_reads() {
+    let roads = lines(&[("\"highway\":\"track\"", 0.0)]);
+    let scene = with_features(&[("roads.geojson", &roads), ("roads.prj", "")], "sources = [\"roads.geojson\"]");
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    fs::create_dir(scene.path("jobs")).unwrap();
+    fs::write(scene.path("jobs/job.toml"), job.replace("roads.geojson", "../roads.geojson")).unwrap();
+    let emitted = |emit| scene.run_to(0, &["plan", "jobs/job.toml", "--emit", emit, "--out", "jobs/a.tdb"]).stdout;
+    for emit in ["ninja", "snakemake"] {
+        let text = emitted(emit);
+        for name in ["/roads.geojson", "/roads.prj"] {
+            assert!(text.contains(name), "{emit}: {name} is not in: {text}");
+        }
+    }
+    let mounted = format!("mountPath: \"{}\"\n", scene.path("").canonicalize().unwrap().display());
+    let text = emitted("kubernetes");
+    assert!(text.contains(&mounted), "{mounted:?} is not in: {text}");
+}
+
+#[test]
 fn plan_counts_the_buildings_that_a_job_keeps() {
     let house = |east_km: f64| {
         let west = -116.923 + east_km * 0.011;

@@ -93,6 +93,33 @@ mod page {
         assert_eq!(part.chunks(40).count(), lines.chunks(40).filter(|edge| edge[0] == 2).count());
     }
 
+    /// A river from west to east, a part of it drawn as water, 200 m wide.
+    const RIVER: &str = r#"{"type": "FeatureCollection",
+        "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32611"}}, "features": [
+        {"type": "Feature", "properties": {"waterway": "river"}, "geometry": {"type": "LineString",
+            "coordinates": [[505200, 3877000], [508800, 3877000]]}},
+        {"type": "Feature", "properties": {"natural": "water", "water": "river"}, "geometry": {"type": "Polygon",
+            "coordinates": [[[506000, 3876900], [507500, 3876900], [507500, 3877100], [506000, 3877100],
+            [506000, 3876900]]]}}]}"#;
+
+    #[test]
+    fn the_line_of_a_river_is_not_drawn_on_its_water() {
+        let scene = Scene::with_job("small.toml", &[]);
+        let job = std::fs::read_to_string(scene.path("job.toml")).unwrap();
+        std::fs::write(scene.path("river.geojson"), RIVER).unwrap();
+        std::fs::write(scene.path("job.toml"), format!("{job}\n[features]\nsources = [\"river.geojson\"]\n")).unwrap();
+        scene.run_to(0, &["build", "job.toml", "--quiet", "--no-html"]);
+        let server = served_in(scene, "small.tdb");
+        for path in ["/api/lines/0/0/8/8", "/api/lines"] {
+            let lines = server.asked(path).1;
+            let metres = |at: &[u8]| f64::from(f32::from_le_bytes(at.try_into().unwrap()));
+            let middle = |edge: &[u8]| f64::midpoint(metres(&edge[16..20]), metres(&edge[28..32]));
+            let on_water = |east: &f64| (1050.0..2450.0).contains(east);
+            let (wet, dry): (Vec<f64>, Vec<f64>) = lines.chunks(40).map(middle).partition(on_water);
+            assert!(wet.is_empty() && !dry.is_empty(), "{path}: {wet:?}");
+        }
+    }
+
     /// Two houses, the larger one with a courtyard, and one that hangs over the ground.
     const HOUSES: &str = r#"{"type": "FeatureCollection",
         "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32611"}}, "features": [

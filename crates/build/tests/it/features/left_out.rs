@@ -34,8 +34,9 @@ fn drawing(words: Words) -> Drawing {
 /// Places of a level's vertices, in quanta from the area's corner.
 fn places(drawing: &Drawing, level: usize) -> BTreeSet<[i64; 2]> {
     let folder = store::Folder::new(drawing.scene.path("area.tdb"));
+    let manifest = folder.manifest().unwrap();
     let tiles = (0..2).flat_map(|row| (0..2).map(move |col| TileId { row, col }));
-    let modules = tiles.flat_map(|tile| folder.read_levels(tile).unwrap().1.swap_remove(level));
+    let modules = tiles.flat_map(|tile| folder.read_levels(&manifest, tile).unwrap().1.swap_remove(level));
     let side = i64::from(SIDE_CELLS) * 25 * 128;
     let place = |module: &LoadModule| -> Vec<[i64; 2]> {
         let [row, col] = [module.id.row, module.id.col].map(|index| i64::from(index) * side);

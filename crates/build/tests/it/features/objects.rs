@@ -1,12 +1,14 @@
 //! Buildings, walls and woods stand on the ground of load modules, and change nothing of it.
 
 use std::fs;
+use std::sync::atomic::AtomicBool;
 
+use build::Options;
 use load_module_reader::{Area, Block, Curvature, Hider, Keep, LoadedGround, ObjectKind, PastObjects, Sight, SlmFile};
 use store::{Folder, files};
 
 use super::drawing::{Drawing, Drawn, line, polygon};
-use crate::scene::{Scene, Words, assert_same, tile};
+use crate::scene::{Scene, Silent, Still, Tree, Words, assert_same, tile, tree};
 
 fn hills(east: f64, north: f64) -> f64 {
     500.0 + 30.0 * ((east * 0.004).sin() + (north * 0.006).cos())
@@ -272,4 +274,58 @@ fn leaves_of_a_raster_are_woods_by_height() {
     assert_eq!([up(200.0, 200.0), up(500.0, 250.0), up(700.0, 250.0), up(235.0, 235.0)], [13.5, 7.5, 0.0, 0.0]);
     let report = scene(", least_m = 10, kind = \"scrub\"").build("area.tdb", 1).report.objects.unwrap();
     assert_eq!(report.kinds.iter().map(|sums| (sums.kind.as_str(), sums.kept)).collect::<Vec<_>>(), [("scrub", 1)]);
+}
+
+/// Builds with a page.
+fn build_all(scene: &Scene, folder: &str) -> build::Built {
+    let stop = AtomicBool::new(false);
+    build::build(&scene.job, &scene.path(folder), &Options::new(2, &stop, &Still), &mut Silent).unwrap()
+}
+
+/// Every file but the report and its page, which tell what a run did.
+fn beside(scene: &Scene, folder: &str) -> Tree {
+    let is_told = |name: &std::path::Path| name.to_string_lossy().starts_with("report.");
+    tree(&scene.path(folder)).into_iter().filter(|(name, _)| !is_told(name)).collect()
+}
+
+#[test]
+fn what_a_build_leaves_beside_its_tiles_is_named_when_it_is_gone_and_made_again() {
+    let drawing = drawing("[objects]\nlimits = { per_load_module = 30, per_4km_square = 60 }");
+    let (scene, folder) = (&drawing.scene, Folder::new(drawing.scene.path("area.tdb")));
+    drop(build_all(scene, "area.tdb"));
+    let sound = beside(scene, "area.tdb");
+    for name in files::BESIDE_REPORT.into_iter().chain([files::REPORT]) {
+        for damaged in [None, Some("xx")] {
+            let path = folder.path(name);
+            damaged.map_or_else(|| fs::remove_file(&path), |text| fs::write(&path, text)).unwrap();
+            let problems = inspect::verify(folder.dir(), None).unwrap().problems;
+            assert!(problems.iter().any(|problem| problem.contains(name)), "{name}, {damaged:?}: {problems:?}");
+            let built = build_all(scene, "area.tdb");
+            assert!(!built.is_unchanged && (built.kept, built.rebuilt) == (4, 0), "{name}, {damaged:?}");
+            drop(built);
+            assert_same(&sound, &beside(scene, "area.tdb"), name);
+            scene.verify("area.tdb");
+        }
+    }
+    assert!(build_all(scene, "area.tdb").is_unchanged);
+}
+
+#[test]
+fn the_report_of_another_build_is_refused_and_made_again() {
+    let mut drawing = drawing("[objects]\nlimits = { per_load_module = 30, per_4km_square = 60 }");
+    let (path, other) = (drawing.scene.path("area.tdb/report.json"), drawing.scene.path("other.tdb/report.json"));
+    drop(build_all(&drawing.scene, "area.tdb"));
+    let job = drawing.scene.job.clone();
+    drawing.scene.job.objects = None;
+    drop(build_all(&drawing.scene, "other.tdb"));
+    drawing.scene.job = job;
+    fs::copy(other, path).unwrap();
+    let folder = Folder::new(drawing.scene.path("area.tdb"));
+    let error = folder.report().unwrap_err();
+    assert!(error.to_string().contains("report.json") && error.hint().is_some(), "{error}");
+    let problems = inspect::verify(folder.dir(), None).unwrap().problems;
+    assert!(problems.iter().any(|problem| problem.contains("report.json")), "{problems:?}");
+    assert!(!build_all(&drawing.scene, "area.tdb").is_unchanged);
+    assert!(folder.report().unwrap().objects.is_some());
+    drawing.scene.verify("area.tdb");
 }
