@@ -165,8 +165,8 @@ fn every_format_of_meshes_has_the_objects() {
     assert!(tile.contains("def Mesh \"wood_9\"\n") && tile.contains("</tile_r00c00/Materials/object_wood_top>"));
     let gazebo = files(|put, work| crate::write_gazebo(&product, put, work));
     let world = String::from_utf8_lossy(&gazebo["area.sdf"]).into_owned();
-    // A chimney, the eastern piece of the house, and the western one, whose courtyard leaves 83 % of it.
-    assert_eq!(world.matches("<collision name=\"object_").count(), 3, "{world}");
+    // A chimney, the eastern piece of the house, and the walls of the western one, whose courtyard leaves 83 % of it.
+    assert_eq!(world.matches("<collision name=\"object_").count(), 9, "{world}");
     assert!(gazebo.contains_key("meshes/r0000c0000_r0000c0001_seen.obj"));
     let flight = files(|put, work| crate::write_openflight(&product, put, work));
     let square = &flight["squares/r00c00.flt"];
