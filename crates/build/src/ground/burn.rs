@@ -126,8 +126,8 @@ impl<'a> Burning<'a> {
         }
     }
 
-    /// Cuts what stands above decks: half a metre below them, and within a post of them as steep as a cut is. A triangle
-    /// that reaches under a deck has its corners there.
+    /// Cuts what stands above decks: half a metre below them, and within a post of them as steep as a cut is. A
+    /// triangle that reaches under a deck has its corners there.
     fn decks(&mut self) {
         const BELOW: i32 = QUANTA_PER_METRE / 2;
         let quanta_per_step = self.spacing.metres() / f64::from(self.steps) * f64::from(QUANTA_PER_METRE);

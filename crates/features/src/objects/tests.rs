@@ -191,8 +191,8 @@ fn woods_leave_roads_and_buildings_free() {
     let near = canopy.places.iter().filter(|at| (f64::from(at[0]) / METRE - 250.0).abs() < 3.9);
     let between = near.filter(|at| (145.0..249.0).contains(&(f64::from(at[1]) / METRE)));
     assert_eq!(between.collect::<Vec<_>>(), Vec::<&[u16; 2]>::new());
-    // As many roads as cost much more than the wood: they are free where there is room for that, and the wood is there in
-    // any case.
+    // As many roads as cost much more than the wood: they are free where there is room for that, and the wood is there
+    // in any case.
     let many: Vec<Plan> =
         (0..40).flat_map(|k| strips(&[[90.0 + 8.0 * f64::from(k), 90.0], [98.0, 410.0]].map(quanta), 128)).collect();
     let claims = Claims::of(&outlines, &many, [2, 2], SIDE);
