@@ -14,7 +14,7 @@ use crate::{Edge, FeatureId, Flaw, Kind, Network, Place, Remark, Remedy};
 const HILL_CUTS: i32 = 3;
 
 /// Quanta that ground stays below a deck where it may: half a metre.
-const GAP: i32 = 64;
+pub const DECK_GAP: i32 = 64;
 
 /// The height of the ground at a place, where there is one.
 type Ground<'a> = &'a dyn Fn(Place) -> Option<i32>;
@@ -175,7 +175,7 @@ pub(crate) fn uncut(network: &Network, (beside, ground): (&Beside, Ground), cut_
             let ends = [(0, a), (left.len() - 1, b)];
             let rests = ends.iter().any(|(end, node)| *end == at && network.nodes[*node as usize].on_ground);
             if let Some(top) = ground(one).max(ground(other)).filter(|_| !rests && one != other) {
-                lines.push(Water { ends: [one, other], heights: [top - cut_max + GAP; 2], kind: Kind::Breakline });
+                lines.push(Water { ends: [one, other], heights: [top - cut_max + DECK_GAP; 2], kind: Kind::Breakline });
             }
         }
     }

@@ -73,6 +73,7 @@ mod smooth;
 mod sweep;
 pub use sweep::Pin;
 mod aground;
+pub use aground::DECK_GAP;
 mod decks;
 mod passing;
 pub use decks::{Clearances, Water};

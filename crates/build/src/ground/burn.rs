@@ -6,7 +6,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use features::{CUT_RUN, ROADSIDE_REACH_M, WATERSIDE_REACH_M, Watersides, height_in, moved_by_road, nearest_on, offs};
+use features::{
+    CUT_RUN, DECK_GAP, ROADSIDE_REACH_M, WATERSIDE_REACH_M, Watersides, height_in, moved_by_road, nearest_on, offs,
+};
 use terrain::{Dem, Importance, LatticePoint, Post, PostRect, QUANTA_PER_METRE, SurfaceGround, TileFeatures};
 use terrain::{Spacing, Vertex};
 
@@ -126,10 +128,9 @@ impl<'a> Burning<'a> {
         }
     }
 
-    /// Cuts what stands above decks: half a metre below them, and within a post of them as steep as a cut is. A
-    /// triangle that reaches under a deck has its corners there.
+    /// Cuts what stands in the way of decks: under them to where ground may stay, and within a post of them as steep as
+    /// a cut is. A triangle that reaches under a deck has its corners there.
     fn decks(&mut self) {
-        const BELOW: i32 = QUANTA_PER_METRE / 2;
         let quanta_per_step = self.spacing.metres() / f64::from(self.steps) * f64::from(QUANTA_PER_METRE);
         for deck in &self.features.decks {
             let ring = &deck.ring[..];
@@ -142,7 +143,7 @@ impl<'a> Burning<'a> {
                     (steps <= f64::from(self.steps)).then(|| rounded(height + steps * quanta_per_step / CUT_RUN))
                 };
                 let highest = match under.contains(&post) {
-                    true => Some(height_in(&[ring], at) - BELOW),
+                    true => Some(height_in(&[ring], at) - DECK_GAP),
                     false => ring.iter().zip(ring.iter().cycle().skip(1)).filter_map(beside).min(),
                 };
                 let index = self.rect.index(post);
