@@ -115,10 +115,10 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
             clip(&points, &layout, heights, &window.importance)
         }
     };
-    let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
-    lift(&mut modules, &decks);
     let lines = cut_lines(keys::lines_of(run.job, &features), features.kept.steps_per_post, &layout);
     modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
+    let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
+    lift(&mut modules, &decks);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;

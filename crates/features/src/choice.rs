@@ -1,6 +1,6 @@
 //! What there is to choose from, and what came of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::outlay::Outlays;
 use crate::pieces::is_narrow;
@@ -31,6 +31,8 @@ pub(crate) struct Choice<'a> {
     pub stretches: &'a Stretches,
     pub strokes: &'a [Stroke],
     pub outlays: &'a Outlays,
+    /// Edges by which ways lead onto decks ([`crate::pieces::onto_decks`]).
+    pub onto_decks: &'a BTreeSet<u32>,
     pub shares: &'a Shares,
     pub graded: &'a Graded<'a>,
     pub site: &'a Site,
@@ -111,13 +113,13 @@ impl Choice<'_> {
     /// The widest form that any part of a stretch may have, and the width of that part.
     pub fn widest(&self, stretch: u32) -> (u8, i32) {
         let network = self.graded.network;
-        let mut most = (0, 0);
+        let mut most = (Way::LINE, 0);
         if let Part::Way(_, edges) = &self.stretches.all[stretch as usize].part {
             for traits in edges.iter().map(|edge| network.traits(*edge)).filter(|traits| !is_narrow(traits, network)) {
                 let form = match traits.form {
-                    Form::Line | Form::Polygon => 0,
-                    Form::Strip | Form::StripAlways => 1,
-                    Form::Bench => 2,
+                    Form::Line | Form::Polygon => Way::LINE,
+                    Form::Strip | Form::StripAlways => Way::STRIP,
+                    Form::Bench => Way::BENCH,
                 };
                 most = most.max((form, traits.width));
             }

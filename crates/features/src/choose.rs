@@ -52,7 +52,7 @@ impl Choice<'_> {
 
     fn grant(&self, tally: &mut Tally, stretch: u32, of: &Stretch) -> Result<(), Why> {
         let tier = if of.is_main(self.site) { Tier::Main } else { Tier::Others };
-        let way = Some(Way { tolerance: of.coarsest(), form: 0 });
+        let way = Some(Way { tolerance: of.coarsest(), form: Way::LINE });
         let changes = tally.try_set(&[(stretch, way)], tier).map_err(Why::Limit)?;
         let post = i128::from(self.site.lattice.steps_per_post());
         let is_pond = 0 < of.doubled_area && of.doubled_area < 2 * POND_POSTS * post * post;

@@ -3,7 +3,7 @@
 //!
 //! Strokes are thinned as wholes, so that a junction at which nothing else is granted costs nothing on a straight road.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use crate::forms::{shared_places, stations};
 use crate::pieces::is_narrow;
@@ -11,6 +11,7 @@ use crate::shares::Shares;
 use crate::strand::{Graded, Strand};
 use crate::stretches::{Part, Stretches};
 use crate::strokes::Stroke;
+use crate::tally::Way;
 use crate::thin::{Station, Tolerance, thin};
 use crate::{Form, Grants, Place, Site, Traits};
 
@@ -19,8 +20,8 @@ use crate::{Form, Grants, Place, Site, Traits};
 pub(crate) struct End {
     /// Its place, in [`Outlays::points`].
     pub point: u32,
-    /// Whether the segment is a strip where it may be one.
-    pub wide: bool,
+    /// The form from which on the segment is a strip, if there is one.
+    pub strip_from: Option<u8>,
     /// Whether it has slopes where it may.
     pub bench: bool,
     /// Whether the stroke needs no station here where nothing but it passes.
@@ -50,7 +51,7 @@ impl Outlays {
     pub fn of(
         stretches: &Stretches,
         strokes: &[Stroke],
-        graded: &Graded,
+        (graded, onto_decks): (&Graded, &BTreeSet<u32>),
         strands: &[Strand],
         (shares, site): (&Shares, &Site),
     ) -> Self {
@@ -58,7 +59,8 @@ impl Outlays {
         let stays = |place: Place| shared.contains(&place);
         let all = vec![Default::default(); stretches.all.len()];
         let outlays = Self { all, points: Vec::new() };
-        let mut counting = Counting { outlays, numbers: HashMap::new(), graded, stays: &stays, shares, site };
+        let numbers = HashMap::new();
+        let mut counting = Counting { outlays, numbers, graded, onto_decks, stays: &stays, shares, site };
         for stroke in strokes {
             let coarsest = stretches.all[stroke.stretches[0].0 as usize].coarsest();
             for tolerance in 0..=coarsest {
@@ -111,6 +113,7 @@ struct Counting<'a> {
     outlays: Outlays,
     numbers: HashMap<Place, u32>,
     graded: &'a Graded<'a>,
+    onto_decks: &'a BTreeSet<u32>,
     stays: &'a dyn Fn(Place) -> bool,
     shares: &'a Shares,
     site: &'a Site,
@@ -146,6 +149,8 @@ impl Counting<'_> {
         let kept = thin(&stations, Tolerance::ALL[usize::from(tolerance)], grade_ppm, network.lattice);
         let mut needs = vec![false; count];
         kept.into_iter().for_each(|at| needs[at as usize] = true);
+        let leads: Vec<bool> = run.edges.iter().map(|(edge, _)| self.onto_decks.contains(edge)).collect();
+        (1..leads.len()).filter(|at| leads[*at - 1] != leads[*at]).for_each(|at| needs[at] = true);
         let is_mark = |at: &usize| needs[*at] || run.edges[*at - 1].1 != run.edges[*at].1;
         let marks: Vec<usize> = (0..count).filter(|at| *at == 0 || *at + 1 == count || is_mark(at)).collect();
         let is_deck = run.traits.storey.is_deck();
@@ -162,9 +167,10 @@ impl Counting<'_> {
                 }
                 continue;
             }
+            let strip_from = wide.then_some(if leads[ends[0]] { Way::ONTO_DECKS } else { Way::STRIP });
             for &at in ends {
                 let point = self.point(place(at));
-                let end = End { point, wide, bench, free: !needs[at] };
+                let end = End { point, strip_from, bench, free: !needs[at] };
                 self.outlays.all[stretch][usize::from(tolerance)].ends.push(end);
             }
         }
@@ -183,7 +189,7 @@ impl Counting<'_> {
             let points: Vec<u32> = kept.iter().map(number).collect();
             let ends = &mut self.outlays.all[stretch as usize][tolerance].ends;
             for pair in points.windows(2) {
-                ends.extend([pair[0], pair[1]].map(|point| End { point, wide: false, bench: false, free: false }));
+                ends.extend([pair[0], pair[1]].map(|point| End { point, strip_from: None, bench: false, free: false }));
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Chains cut into pieces whose stations are thinned, each segment of which is a line or a strip.
 
+use std::collections::BTreeSet;
+
 use crate::thin::{Station, thin};
 use crate::{FeatureId, FeatureLattice, Form, Grant, Grants, Network, Place, Site, Traits};
 
@@ -114,6 +116,20 @@ pub fn pieces(
         }
     })
     .collect()
+}
+
+/// The edges by which ways that may be strips lead onto wide decks. They become strips before all others: a line would
+/// be a ridge there, and the ground beside it far below both sides of the deck.
+pub(crate) fn onto_decks(network: &Network) -> BTreeSet<u32> {
+    let is_wide = |edge: u32| !is_narrow(network.traits(edge), network);
+    let is_deck = |edge: &u32| network.traits(*edge).storey.is_deck() && is_wide(*edge);
+    let leads = |edge: &u32| {
+        let form = network.traits(*edge).form;
+        network.is_ground(*edge) && is_wide(*edge) && !matches!(form, Form::Line | Form::Polygon)
+    };
+    let decks = (0..network.edges.len() as u32).filter(is_deck);
+    let ends = decks.flat_map(|edge| network.ends(edge)).filter(|node| network.nodes[*node as usize].on_ground);
+    ends.flat_map(|node| network.beside(node)).map(|(_, edge)| *edge).filter(leads).collect()
 }
 
 /// Whether a way is too narrow for a strip.

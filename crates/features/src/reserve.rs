@@ -14,7 +14,7 @@ use crate::choice::{Amiss, Choice, Chosen, Why, ids};
 use crate::clean::Notes;
 use crate::forms::{Formed, Scope, Surface, form};
 use crate::outlay::Outlays;
-use crate::pieces::pieces;
+use crate::pieces::{onto_decks, pieces};
 use crate::room::Sharing;
 use crate::shares::{Cost, Ledger, Shares, Tier, cost, taken};
 use crate::strand::{Graded, Role, Strand};
@@ -89,8 +89,10 @@ pub fn reserve(
 ) -> Reserved {
     let stretches = Stretches::of(graded, strands, site, about);
     let strokes = strokes(&stretches, graded, strands, site);
-    let outlays = Outlays::of(&stretches, &strokes, graded, strands, (shares, site));
-    let choice = Choice { stretches: &stretches, strokes: &strokes, outlays: &outlays, shares, graded, site };
+    let onto_decks = onto_decks(graded.network);
+    let outlays = Outlays::of(&stretches, &strokes, (graded, &onto_decks), strands, (shares, site));
+    let (stretches, strokes, outlays) = (&stretches, &strokes[..], &outlays);
+    let choice = Choice { stretches, strokes, outlays, onto_decks: &onto_decks, shares, graded, site };
     let mut amiss = Amiss::none(shares.modules.len());
     // One full load module on its way makes a line of all of a motorway, so that main kinds may use all of their share
     // for their width, unless other ways lose their place by it.
@@ -172,11 +174,14 @@ fn grants(choice: &Choice, chosen: &Chosen, strands: usize) -> Grants {
     let (mut edges, mut of_strands) = (vec![Grant::OUT; choice.graded.network.edges.len()], vec![Grant::OUT; strands]);
     for (of, way) in choice.stretches.all.iter().zip(&chosen.ways) {
         let grant = way.map_or(Grant::OUT, |Way { tolerance, form }| {
-            let most = [Form::Line, Form::StripAlways, Form::Bench][usize::from(form)];
+            let most = [Form::Line, Form::Line, Form::StripAlways, Form::Bench][usize::from(form)];
             Grant { tolerance, most, out: false }
         });
         match &of.part {
-            Part::Way(_, all) => all.iter().for_each(|edge| edges[*edge as usize] = grant),
+            Part::Way(_, all) => all.iter().for_each(|edge| {
+                let is_wide = way.is_ok_and(|way| way.form == Way::ONTO_DECKS) && choice.onto_decks.contains(edge);
+                edges[*edge as usize] = if is_wide { Grant { most: Form::StripAlways, ..grant } } else { grant };
+            }),
             Part::Strands(all) => all.iter().for_each(|strand| of_strands[*strand as usize] = grant),
         }
     }
@@ -224,8 +229,8 @@ fn remarks(choice: &Choice, chosen: &Chosen, strands: &[Strand]) -> Vec<Remark> 
                     less(Remedy::Coarser { times: 1 << tolerance });
                 }
                 match (form, choice.form_most_of(stretch)) {
-                    (0, 1..) if of.is_inside => less(Remedy::BecameLine),
-                    (1, 2..) if of.is_inside => less(Remedy::BecameStrip),
+                    (..Way::STRIP, Way::STRIP..) if of.is_inside => less(Remedy::BecameLine),
+                    (Way::STRIP, Way::BENCH..) if of.is_inside => less(Remedy::BecameStrip),
                     _ => {}
                 }
             }

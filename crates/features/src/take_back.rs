@@ -77,7 +77,7 @@ impl<'a> TakingBack<'a> {
                     changed = true;
                     continue;
                 }
-                let least = Way { tolerance: choice.stretches.all[stretch as usize].coarsest(), form: 0 };
+                let least = Way { tolerance: choice.stretches.all[stretch as usize].coarsest(), form: Way::LINE };
                 if way != least {
                     let stretches = choice.strokes[stroke as usize].stretches.iter();
                     let kept = stretches.filter(|(at, _)| tally.granted[*at as usize].is_some());

@@ -3,11 +3,22 @@
 use crate::outlay::{End, Outlays};
 use crate::shares::{Ledger, Limit, Tier};
 
-/// What a stretch is granted: places in [`crate::Tolerance::ALL`] and among line, strip and bench.
+/// What a stretch is granted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Way {
+    /// A place in [`crate::Tolerance::ALL`].
     pub tolerance: u8,
+    /// One of the forms below.
     pub form: u8,
+}
+
+/// Forms, each of more triangles than the one before.
+impl Way {
+    pub const LINE: u8 = 0;
+    /// A line, but a strip by which it leads onto a deck.
+    pub const ONTO_DECKS: u8 = 1;
+    pub const STRIP: u8 = 2;
+    pub const BENCH: u8 = 3;
 }
 
 /// Triangles of what is granted, in every load module.
@@ -61,10 +72,11 @@ impl<'a> Tally<'a> {
         let Some(Way { tolerance, form }) = way else { return };
         let outlay = &self.outlays.all[stretch as usize][usize::from(tolerance)];
         self.changes.extend(outlay.decks.iter().map(|(module, triangles)| (*module, sign * i64::from(*triangles))));
-        for &End { point, wide, bench, free } in &outlay.ends {
+        for &End { point, strip_from, bench, free } in &outlay.ends {
             let ends = &mut self.ends[point as usize];
             let before = corners(*ends);
-            for (count, is) in ends.iter_mut().zip([true, wide && 0 < form, bench && 1 < form, free]) {
+            let is_strip = strip_from.is_some_and(|from| from <= form);
+            for (count, is) in ends.iter_mut().zip([true, is_strip, bench && form == Way::BENCH, free]) {
                 if is {
                     *count = by(*count);
                 }

@@ -253,8 +253,8 @@ impl<'a> Decided<'a> {
             let decks = decks.get(id).copied().unwrap_or(0);
             let all = triangles.get(&at).copied().unwrap_or(0) + decks;
             let least = all - anyway.get(&at).copied().unwrap_or(0).min(all);
-            // Decks may have two corners more, each of two triangles, where ground stands above them.
-            let most = if decks == 0 { all } else { all + 4 };
+            // Decks may have six corners more, each of two triangles, where ground stands above them.
+            let most = if decks == 0 { all } else { all + 12 };
             !(least..=most).contains(&reserved[grid.index(*id)])
         };
         let id = grid.all().iter().find(is_wrong)?;

@@ -5,9 +5,9 @@
 //! On the sides of a load module they rise by what is on the side alone, so that both load modules of a line raise the
 //! same corners by as much, whatever either has inside.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use terrain::{Decks, LoadModule, ModuleVertex};
+use terrain::{Decks, LineStorey, LoadModule, ModuleLine, ModuleVertex};
 
 /// Quanta that a deck may lie under the ground, as rounding puts it.
 const ROUNDING: f64 = 1.0;
@@ -18,25 +18,24 @@ const DIGITS: f64 = 1e-6;
 /// Square quanta of the least piece that is one.
 const AREA_MIN: f64 = 1.0;
 
-/// How far beyond the ground corners may rise for a place beside them.
-#[derive(Clone, Copy)]
-struct Bounds {
-    /// The least part of what is missing at a place that the corners which may rise have to bear: where they lie
-    /// farther off, they would have to rise far beyond the ground.
-    share_min: f64,
-    /// Whether a corner may rise no farther above the highest ground than it lies below that.
-    is_capped: bool,
-}
+/// The least part of what is missing at a place that the corners which may rise have to bear at first: where they lie
+/// farther off, they would have to rise far beyond the ground, and one is added.
+const SHARE_MIN: f64 = 0.5;
 
-/// Bounds while corners can be added where they are needed.
-const USUAL: Bounds = Bounds { share_min: 0.1, is_capped: true };
+/// The same where there is no room for one, and corners at ends of decks rise, too.
+const SHARE_MIN_FREE: f64 = 0.1;
 
-/// Bounds where there is no room for another: a deck that rises steeply is better than one in the ground, but for each
-/// place a corner rises by no more than twice what is missing there.
-const LAST: Bounds = Bounds { share_min: 0.5, is_capped: false };
+/// The same at last, to no cap: a deck that rises steeply is better than one in the ground.
+const SHARE_MIN_LAST: f64 = 0.3;
+
+/// How often all places are gone through at most where no corner can be added.
+const LAST_TIMES: usize = 4;
 
 /// The least part of a height that a corner has to make up to have a say in it.
 const WEIGHT_MIN: f64 = 1e-9;
+
+/// The part of what is missing most that is about as much.
+const NEARLY: f64 = 0.9;
 
 /// Quanta under the ground for which a corner is added.
 const ADDED_FOR: f64 = 4.0;
@@ -44,34 +43,82 @@ const ADDED_FOR: f64 = 4.0;
 /// The decks of a load module, raised onto the triangles of the ground that stand above them as far as corners reach,
 /// with at most so many triangles.
 pub fn lift_decks(decks: &Decks, ground: &LoadModule, most: usize) -> Decks {
-    let mut decks = decks.clone();
+    let all: BTreeSet<[u16; 2]> = decks.vertices.iter().map(|vertex| place(*vertex)).collect();
+    // Where corners are added in vain, those that were drawn may do better without them.
+    let tries = [(BTreeSet::new(), most), (all.clone(), most), (all, 0)];
+    let mut best: Option<(Decks, f64)> = None;
+    for (free, most) in tries {
+        let (lifted, missing) = lifted(decks, ground, free, most);
+        if best.as_ref().is_none_or(|(_, least)| missing < *least) {
+            best = Some((lifted, missing));
+        }
+        if missing <= ADDED_FOR {
+            break;
+        }
+    }
+    best.map(|(lifted, _)| lifted).unwrap_or_default()
+}
+
+/// The same, and what is still missing most, where corners at these places rise wherever they are.
+fn lifted(drawn: &Decks, ground: &LoadModule, mut free: BTreeSet<[u16; 2]>, most: usize) -> (Decks, f64) {
+    let mut decks = drawn.clone();
     loop {
-        let (lift, left) = Lift::onto(ground, &decks, USUAL);
-        let Some(left) = left.filter(|left| ADDED_FOR < left.missing) else {
-            return lift.raised();
-        };
+        let mut lift = Lift::of(ground, &decks);
+        let mut reaches = lift.reaches(ground);
+        let [usual, last] = [lift.usual(&free), lift.last(&reaches)];
+        lift.raise_inside(&mut reaches, &usual);
+        let mut far: Vec<&Reach> = reaches.iter().filter(|reach| ADDED_FOR < reach.missing).collect();
+        far.sort_by(|one, other| other.missing.total_cmp(&one.missing));
+        // Of places that miss about as much, one on the rim: no sliver is left beside it that nothing could raise.
+        let about = NEARLY * far.first().map_or(0.0, |reach| reach.missing);
+        far.sort_by_key(|reach| reach.missing < about || !is_on_rim(&decks, reach));
         let has_room = decks.triangles.len() + 2 <= most;
-        let Some(more) = has_room.then(|| with_corner(&decks, &left, ground.side)).flatten() else {
-            return Lift::onto(ground, &decks, LAST).0.raised();
-        };
-        decks = more;
+        let more = far.iter().filter(|_| has_room).find_map(|reach| with_corner((drawn, &decks), reach, ground.side));
+        if let Some(more) = more {
+            decks = more;
+            continue;
+        }
+        let before = free.len();
+        let corners = far.iter().flat_map(|reach| decks.triangles[reach.triangle]);
+        free.extend(corners.map(|corner| place(decks.vertices[usize::from(corner)])));
+        if before == free.len() {
+            for _ in 0..LAST_TIMES {
+                if reaches.iter().any(|reach| ADDED_FOR < reach.missing) {
+                    lift.raise_inside(&mut reaches, &last);
+                }
+            }
+            return (lift.raised(), reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max));
+        }
     }
 }
 
+/// Whether a place of a triangle is on an edge of it that no other triangle has.
+fn is_on_rim(decks: &Decks, reach: &Reach) -> bool {
+    let corners = decks.triangles[reach.triangle];
+    let is_rim = |across: usize| {
+        let ends = [corners[(across + 1) % 3], corners[(across + 2) % 3]];
+        let has = |triangle: &&[u16; 3]| ends.iter().all(|end| triangle.contains(end));
+        reach.weights[across].abs() < WEIGHT_MIN && decks.triangles.iter().filter(has).count() == 1
+    };
+    (0..3).any(is_rim)
+}
+
 /// Decks with one more corner at a place of a triangle, and of its neighbour where it lies on an edge; nothing where
-/// that is a corner already, or on a side of the load module.
-fn with_corner(decks: &Decks, reach: &Reach, side: u16) -> Option<Decks> {
+/// that is a corner or close to one that was drawn, or on a side of the load module.
+fn with_corner((drawn, decks): (&Decks, &Decks), reach: &Reach, side: u16) -> Option<Decks> {
     let corners = |triangle: &[u16; 3]| triangle.map(|corner| decks.vertices[usize::from(corner)]);
     let of = corners(&decks.triangles[reach.triangle]);
     let at = [0, 1].map(|axis| (dot(of.map(|vertex| at(vertex)[axis]), reach.weights) + 0.5).floor() as u16);
     let plane = dot(of.map(|vertex| f64::from(vertex.z)), weights(of, at.map(f64::from)));
     let added = ModuleVertex { y: at[1], x: at[0], z: (plane + 0.5).floor() as i32 };
-    if of.iter().any(|corner| place(*corner) == at) || at.iter().any(|along| *along == 0 || *along == side) {
+    let is_close = |corner: &ModuleVertex| apart(self::at(*corner), at.map(f64::from)) < APART_MIN;
+    let is_corner = drawn.vertices.iter().any(is_close) || decks.vertices.iter().any(|corner| place(*corner) == at);
+    if is_corner || at.iter().any(|along| *along == 0 || *along == side) {
         return None;
     }
     let is_near = |&[from, to]: &[ModuleVertex; 2]| {
         let [from, to] = [from, to].map(self::at);
-        cross(from, to, at.map(f64::from)).abs() <= EDGE * (to[0] - from[0]).hypot(to[1] - from[1])
+        cross(from, to, at.map(f64::from)).abs() <= EDGE * apart(from, to)
     };
     let edges = |of: [ModuleVertex; 3]| [[of[0], of[1]], [of[1], of[2]], [of[2], of[0]]];
     let split = edges(of).into_iter().find(is_near);
@@ -93,11 +140,27 @@ fn with_corner(decks: &Decks, reach: &Reach, side: u16) -> Option<Decks> {
 /// Quanta from an edge within which a place lies on it.
 const EDGE: f64 = 2.0;
 
+/// Quanta between a corner that was drawn and one that is added at least, which is half a metre.
+const APART_MIN: f64 = 64.0;
+
 /// Decks, and the heights that their vertices have come to.
 struct Lift<'a> {
     decks: &'a Decks,
     heights: Vec<f64>,
-    bounds: Bounds,
+    /// Which vertices are inside of the load module: those on its sides stay as they are.
+    are_inside: Vec<bool>,
+    /// Of vertices at ends of decks on the ground, its height there.
+    ends: Vec<Option<f64>>,
+    /// The highest that the ground is.
+    top: f64,
+}
+
+/// How far vertices of decks may rise.
+struct Bounds {
+    /// How high at most.
+    most: Vec<f64>,
+    /// What the corners of a triangle have to bear together of what is missing at a place, by the least of theirs.
+    share_min: Vec<f64>,
 }
 
 /// A place of the ground that a triangle of decks has to reach.
@@ -111,16 +174,16 @@ struct Reach {
 }
 
 impl<'a> Lift<'a> {
-    fn of(decks: &'a Decks, bounds: Bounds) -> Self {
-        Self { decks, heights: decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect(), bounds }
-    }
-
-    /// Decks raised onto the ground as far as corners reach, and what misses most.
-    fn onto(ground: &LoadModule, decks: &'a Decks, bounds: Bounds) -> (Self, Option<Reach>) {
-        let mut lift = Self::of(decks, bounds);
+    /// Decks whose vertices on the sides have been raised onto the ground.
+    fn of(ground: &LoadModule, decks: &'a Decks) -> Self {
+        let heights = decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect();
+        let is_inside = |vertex: &ModuleVertex| place(*vertex).iter().all(|at| 0 < *at && *at < ground.side);
+        let are_inside = decks.vertices.iter().map(is_inside).collect();
+        let ends = decks.vertices.iter().map(|vertex| at_end(*vertex, ground)).collect();
+        let top = top(ground.vertices.iter().map(|vertex| f64::from(vertex.z)));
+        let mut lift = Self { decks, heights, are_inside, ends, top };
         lift.raise_sides(ground);
-        let left = lift.raise_inside(ground);
-        (lift, left)
+        lift
     }
 
     /// Raises vertices on the sides onto the ground there, and both ends of an edge along a side so far that it clears
@@ -157,9 +220,8 @@ impl<'a> Lift<'a> {
         }
     }
 
-    /// Raises vertices inside until every triangle reaches the ground beneath it: what misses most first. Returns what
-    /// is left.
-    fn raise_inside(&mut self, ground: &LoadModule) -> Option<Reach> {
+    /// The places of the ground that stand above triangles of decks, the highest above them first.
+    fn reaches(&self, ground: &LoadModule) -> Vec<Reach> {
         let boxes: Vec<[u16; 4]> = ground.triangles.iter().map(|triangle| bounds(triangle, &ground.vertices)).collect();
         let mut reaches = Vec::new();
         for number in 0..self.decks.triangles.len() {
@@ -171,31 +233,62 @@ impl<'a> Lift<'a> {
             }
         }
         reaches.sort_by(|one, other| other.missing.total_cmp(&one.missing).then(one.triangle.cmp(&other.triangle)));
-        let top = top(ground.vertices.iter().map(|vertex| f64::from(vertex.z)));
-        let is_inside = |vertex: ModuleVertex| place(vertex).iter().all(|at| 0 < *at && *at < ground.side);
-        for &Reach { triangle, weights, height, .. } in &reaches {
-            let corners = self.decks.triangles[triangle].map(usize::from);
-            let missing = height - dot(corners.map(|corner| self.heights[corner]), weights);
-            let shares =
-                [0, 1, 2].map(|at| if is_inside(self.decks.vertices[corners[at]]) { weights[at] } else { 0.0 });
-            // The least rise of all together that does it.
-            let squares = shares
-                .iter()
-                .map(|share| share * share)
-                .sum::<f64>()
-                .max(self.bounds.share_min * self.bounds.share_min);
-            for at in (0..3).filter(|_| 0.0 < missing) {
-                let most = if self.bounds.is_capped { self.cap(corners[at], top) } else { f64::INFINITY };
-                let height = &mut self.heights[corners[at]];
-                *height = (*height + missing * shares[at] / squares).min(most);
+        reaches
+    }
+
+    /// How vertices may rise at first: inside to their cap, unless they are held where a deck ends and are not free.
+    fn usual(&self, free: &BTreeSet<[u16; 2]>) -> Bounds {
+        let is_free: Vec<bool> = self.decks.vertices.iter().map(|vertex| free.contains(&place(*vertex))).collect();
+        let most = |at: usize| match (self.are_inside[at], self.ends[at]) {
+            (false, _) => self.heights[at],
+            (_, Some(ground)) if !is_free[at] => self.heights[at].max(ground - ROUNDING),
+            _ => self.cap(at, self.top),
+        };
+        let share = |is_free: &bool| if *is_free { SHARE_MIN_FREE } else { SHARE_MIN };
+        Bounds { most: (0..is_free.len()).map(most).collect(), share_min: is_free.iter().map(share).collect() }
+    }
+
+    /// How vertices may rise where no corner can be added: inside by what the place that asks them for most needs
+    /// of them, and by no more than it misses where they lie too far off; on sides not at all.
+    fn last(&self, reaches: &[Reach]) -> Bounds {
+        let mut most = self.heights.clone();
+        for reach in reaches {
+            let corners = self.decks.triangles[reach.triangle].map(usize::from);
+            let shares = [0, 1, 2].map(|at| if self.are_inside[corners[at]] { reach.weights[at] } else { 0.0 });
+            let share = dot(shares, shares).sqrt();
+            let rise = if share < SHARE_MIN_LAST { reach.missing } else { reach.missing / share };
+            for corner in corners.into_iter().filter(|corner| self.are_inside[*corner]) {
+                most[corner] = most[corner].max(self.heights[corner] + rise);
             }
         }
-        self.lower_inside(&reaches, is_inside);
-        for reach in &mut reaches {
-            let corners = self.decks.triangles[reach.triangle].map(usize::from);
-            reach.missing = reach.height - dot(corners.map(|corner| self.heights[corner]), reach.weights);
+        Bounds { share_min: vec![SHARE_MIN_LAST; most.len()], most }
+    }
+
+    /// Raises vertices until every triangle reaches the ground beneath it, each at most so high, and says what each
+    /// place still misses.
+    fn raise_inside(&mut self, reaches: &mut [Reach], Bounds { most, share_min }: &Bounds) {
+        for &Reach { triangle, weights, height, .. } in reaches.iter() {
+            let corners = self.decks.triangles[triangle].map(usize::from);
+            let missing = height - self.height_at(triangle, weights);
+            let has_room = |corner: usize| self.heights[corner] < most[corner];
+            let shares = [0, 1, 2].map(|at| if has_room(corners[at]) { weights[at] } else { 0.0 });
+            let share_min = corners.map(|corner| share_min[corner]).into_iter().fold(1.0, f64::min);
+            // The least rise of all together that does it.
+            let squares = dot(shares, shares).max(share_min * share_min);
+            for at in (0..3).filter(|_| 0.0 < missing) {
+                let height = &mut self.heights[corners[at]];
+                *height = (*height + missing * shares[at] / squares).min(most[corners[at]]);
+            }
         }
-        reaches.into_iter().max_by(|one, other| one.missing.total_cmp(&other.missing))
+        self.lower_inside(reaches);
+        for reach in reaches {
+            reach.missing = reach.height - self.height_at(reach.triangle, reach.weights);
+        }
+    }
+
+    /// The height of a triangle of decks, as it has become, at a place.
+    fn height_at(&self, triangle: usize, weights: [f64; 3]) -> f64 {
+        dot(self.decks.triangles[triangle].map(|corner| self.heights[usize::from(corner)]), weights)
     }
 
     /// The decks as they have become.
@@ -210,18 +303,18 @@ impl<'a> Lift<'a> {
     }
 
     /// Lowers vertices inside again as far as each may alone.
-    fn lower_inside(&mut self, reaches: &[Reach], is_inside: impl Fn(ModuleVertex) -> bool) {
+    fn lower_inside(&mut self, reaches: &[Reach]) {
         let corners = |reach: &Reach| self.decks.triangles[reach.triangle].map(usize::from);
         let mut of: BTreeMap<usize, Vec<&Reach>> = BTreeMap::new();
         for reach in reaches {
             corners(reach).into_iter().for_each(|corner| of.entry(corner).or_default().push(reach));
         }
-        for (vertex, reaches) in of.into_iter().filter(|(vertex, _)| is_inside(self.decks.vertices[*vertex])) {
+        for (vertex, reaches) in of.into_iter().filter(|(vertex, _)| self.are_inside[*vertex]) {
             let mut least = f64::from(self.decks.vertices[vertex].z);
             for reach in reaches {
                 let (corners, weights, height) = (corners(reach), reach.weights, reach.height);
                 for at in (0..3).filter(|at| corners[*at] == vertex && WEIGHT_MIN < weights[*at]) {
-                    let all = dot(corners.map(|corner| self.heights[corner]), weights);
+                    let all = self.height_at(reach.triangle, weights);
                     least = least.max(self.heights[vertex] + (height - all) / weights[at]);
                 }
             }
@@ -229,25 +322,49 @@ impl<'a> Lift<'a> {
         }
     }
 
-    /// How high a vertex may be raised where that is capped.
+    /// How high a vertex may be raised at most where the highest of the ground is so high: no farther above that than it
+    /// lies below.
     fn cap(&self, vertex: usize, top: f64) -> f64 {
         self.heights[vertex].max(2.0 * top - f64::from(self.decks.vertices[vertex].z))
     }
 
     /// Adds the corners of what a triangle of decks and one of the ground have in common, where that is above.
     fn reach(&self, triangle: usize, beneath: [ModuleVertex; 3], reaches: &mut Vec<Reach>) {
-        let corners = self.decks.triangles[triangle].map(usize::from);
-        let [deck, ground] = [corners.map(|corner| self.decks.vertices[corner]), beneath];
+        let deck = self.decks.triangles[triangle].map(|corner| self.decks.vertices[usize::from(corner)]);
+        let ground = beneath;
         for at in common(deck, ground) {
             let weights = weights(deck, at);
             let height = dot(ground.map(|vertex| f64::from(vertex.z)), self::weights(ground, at)) - ROUNDING;
-            let missing = height - dot(corners.map(|corner| self.heights[corner]), weights);
+            let missing = height - self.height_at(triangle, weights);
             if 0.0 < missing {
                 reaches.push(Reach { missing, triangle, weights, height });
             }
         }
     }
 }
+
+/// The height of the ground at a vertex where a deck ends on it: beside an end of a bridge's line, within its width.
+fn at_end(vertex: ModuleVertex, ground: &LoadModule) -> Option<f64> {
+    let is_inside = |end: &ModuleVertex| place(*end).iter().all(|at| 0 < *at && *at < ground.side);
+    let is_beside = |line: &ModuleLine| {
+        let reach = END_PART * f64::from(line.traits.width);
+        let ends = [line.vertices.first(), line.vertices.last()].into_iter().flatten();
+        line.traits.storey == LineStorey::Bridge
+            && ends.filter(|end| is_inside(end)).any(|end| apart(at(*end), at(vertex)) <= reach)
+    };
+    if !ground.lines.iter().any(is_beside) {
+        return None;
+    }
+    let triangles = ground.triangles.iter().map(|triangle| triangle.map(|at| ground.vertices[usize::from(at)]));
+    triangles.into_iter().find_map(|triangle| {
+        let weights = weights(triangle, at(vertex));
+        let is_in = weights.iter().all(|weight| -WEIGHT_MIN < *weight);
+        is_in.then(|| dot(triangle.map(|corner| f64::from(corner.z)), weights))
+    })
+}
+
+/// How far from an end of a bridge's line its corners are at most, as a part of its width.
+const END_PART: f64 = 0.75;
 
 /// The highest of heights of the ground.
 fn top(heights: impl Iterator<Item = f64>) -> f64 {
@@ -260,6 +377,10 @@ fn place(vertex: ModuleVertex) -> [u16; 2] {
 
 fn at(vertex: ModuleVertex) -> [f64; 2] {
     place(vertex).map(f64::from)
+}
+
+fn apart(one: [f64; 2], other: [f64; 2]) -> f64 {
+    (other[0] - one[0]).hypot(other[1] - one[1])
 }
 
 fn dot(one: [f64; 3], other: [f64; 3]) -> f64 {
@@ -370,13 +491,7 @@ mod tests {
 
     /// How far the ground stands above decks at most.
     fn deepest(decks: &Decks, ground: &LoadModule) -> f64 {
-        let lift = Lift::of(decks, USUAL);
-        let mut reaches = Vec::new();
-        for number in 0..decks.triangles.len() {
-            for beneath in &ground.triangles {
-                lift.reach(number, beneath.map(|corner| ground.vertices[usize::from(corner)]), &mut reaches);
-            }
-        }
+        let reaches = Lift::of(ground, decks).reaches(ground);
         reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max)
     }
 
