@@ -451,4 +451,26 @@ mod tests {
         assert!(levelled.remarks.iter().any(|remark| remark.remedy.leaves_out()));
         assert!(levelled.reserved.left_out.iter().all(|left| matches!(left.why, crate::Why::Limit(_))));
     }
+
+    #[test]
+    fn a_road_that_is_a_line_for_want_of_room_leads_onto_a_bridge_as_a_strip() {
+        let bends: Vec<(f64, f64)> = (0..12).map(|at| (60.0 + f64::from(at), 70.0 + f64::from(at % 2))).collect();
+        let sources = || {
+            vec![
+                way(1, "highway=primary", &bends),
+                way(2, "highway=primary bridge=yes", &[(71.0, 71.0), (74.0, 71.0)]),
+                way(3, "highway=primary", &[(74.0, 71.0), (80.0, 71.0)]),
+            ]
+        };
+        // Of all that there may be room for, some is enough for this and not for a strip over the whole.
+        let is_both = |room: u64| {
+            let formed = samples::levelled(sources(), |_, _| 5.0, &Shares::each([8, 8], room)).reserved.formed;
+            let lines = formed.edges.iter().any(|edge| edge.id.number == 1 && edge.role == Role::Centre);
+            let decks = || formed.decks.iter().flat_map(|deck| &deck.corners);
+            let is_beside = |(place, _): &(Place, i32)| decks().any(|(corner, _)| corner == place);
+            let onto = formed.faces.iter().any(|face| face.id.number == 1 && face.corners.iter().any(is_beside));
+            lines && onto
+        };
+        assert!((20..80).any(is_both));
+    }
 }

@@ -454,7 +454,7 @@ fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{ModuleId, ModuleResidual};
+    use terrain::{LineForm, LineKind, LineTraits, ModuleId, ModuleResidual};
 
     const SIDE: u16 = 12_800;
 
@@ -519,8 +519,11 @@ mod tests {
         let [a, b, c, d] = [(0, 6390), (SIDE, 6390), (SIDE, 6410), (0, 6410)].map(at);
         let lifted = lift_decks(&Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]), &ground, 4);
         assert_eq!(lifted.check(SIDE), Ok(()));
-        assert!((lifted.triangles.len(), lifted.vertices.len()) == (4, 5), "{lifted:?}");
-        assert!(lifted.vertices.contains(&vertex(6400, 6400, 2999)), "{lifted:?}");
+        // One on its rim does, within a tenth of a metre of the top.
+        assert!((lifted.triangles.len(), lifted.vertices.len()) == (3, 5), "{lifted:?}");
+        let is_at_top =
+            |vertex: &ModuleVertex| apart(super::at(*vertex), [6400.0; 2]) <= 15.0 && (2990..3010).contains(&vertex.z);
+        assert!(lifted.vertices.iter().any(is_at_top) && deepest(&lifted, &ground) <= ADDED_FOR, "{lifted:?}");
     }
 
     #[test]
@@ -557,5 +560,29 @@ mod tests {
         let heights: Vec<i32> = sides(&hill(0, 900)).iter().map(|vertex| vertex.z).collect();
         assert!(heights.iter().all(|height| 870 < *height), "{heights:?}");
         assert_eq!(sides(&hill(0, 900)), sides(&hill(1500, 900)));
+    }
+
+    #[test]
+    fn ends_of_a_deck_stay_on_the_ground_and_corners_are_added_between_them() {
+        let mut ground = hill(1000, 0);
+        let [a, b, c, d] = [(2000, 6000), (10_800, 6000), (10_800, 6640), (2000, 6640)].map(|(x, y)| vertex(x, y, 313));
+        let deck = Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]);
+        let highest_end = |lifted: &Decks| {
+            let is_end = |vertex: &&ModuleVertex| [2000, 10_800].contains(&vertex.x);
+            lifted.vertices.iter().filter(is_end).map(|vertex| vertex.z).max()
+        };
+        assert!(Some(600) < highest_end(&lift_decks(&deck, &ground, 8)), "nothing says that they are ends");
+        let traits = LineTraits {
+            kind: LineKind::Travelled,
+            form: LineForm::Strip,
+            storey: LineStorey::Bridge,
+            is_kept: true,
+            is_in_ground: false,
+            width: 640,
+        };
+        let vertices = vec![vertex(2000, 6320, 313), vertex(10_800, 6320, 313)];
+        ground.lines = vec![ModuleLine { class: 3, traits, vertices }];
+        let lifted = lift_decks(&deck, &ground, 8);
+        assert!(highest_end(&lifted) <= Some(320) && deepest(&lifted, &ground) <= ADDED_FOR, "{lifted:?}");
     }
 }
