@@ -5,10 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::outlay::Outlays;
 use crate::pieces::is_narrow;
 use crate::shares::{Limit, Shares};
-use crate::strand::{Graded, Strand};
+use crate::strand::{Graded, Strand, Way};
 use crate::stretches::{Part, Stretches};
 use crate::strokes::Stroke;
-use crate::tally::Way;
 use crate::{FeatureId, Form, Site};
 
 /// Why a stretch is not in the ground.

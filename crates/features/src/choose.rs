@@ -9,10 +9,11 @@ use std::collections::BinaryHeap;
 
 use crate::choice::{Amiss, Choice, Chosen, Why, less};
 use crate::shares::{Ledger, Tier};
+use crate::strand::Way;
 use crate::stretches::Stretch;
 use crate::strokes::Stroke;
 use crate::stubs::take_back;
-use crate::tally::{Tally, Way};
+use crate::tally::Tally;
 use crate::thin::Tolerance;
 
 /// Posts of area below which a body of water is granted only where it is cheap.

@@ -8,10 +8,9 @@ use std::collections::{BTreeSet, HashMap};
 use crate::forms::{shared_places, stations};
 use crate::pieces::is_narrow;
 use crate::shares::Shares;
-use crate::strand::{Graded, Strand};
+use crate::strand::{Graded, Strand, Way};
 use crate::stretches::{Part, Stretches};
 use crate::strokes::Stroke;
-use crate::tally::Way;
 use crate::thin::{Station, Tolerance, thin};
 use crate::{Form, Grants, Place, Site, Traits};
 

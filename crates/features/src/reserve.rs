@@ -17,12 +17,11 @@ use crate::outlay::Outlays;
 use crate::pieces::{onto_decks, pieces};
 use crate::room::Sharing;
 use crate::shares::{Cost, Ledger, Shares, Tier, cost, taken};
-use crate::strand::{Graded, Role, Strand};
+use crate::strand::{Graded, Role, Strand, Way};
 use crate::stretches::{About, Part, Stretches};
 use crate::strokes::strokes;
 use crate::stubs::loose_ends;
 use crate::take_back::TakingBack;
-use crate::tally::Way;
 use crate::{FeatureId, Flaw, Form, Grant, Grants, Kind, Place, Remark, Remedy, Site};
 
 /// Features as they are formed, and what they cost.

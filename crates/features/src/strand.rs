@@ -3,6 +3,24 @@
 
 use crate::{FeatureId, Form, Network, Place, Tolerance};
 
+/// What a stretch is granted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Way {
+    /// A place in [`Tolerance::ALL`].
+    pub tolerance: u8,
+    /// One of the forms below.
+    pub form: u8,
+}
+
+/// Forms, each of more triangles than the one before.
+impl Way {
+    pub const LINE: u8 = 0;
+    /// A line, but a strip by which it leads onto a deck.
+    pub const ONTO_DECKS: u8 = 1;
+    pub const STRIP: u8 = 2;
+    pub const BENCH: u8 = 3;
+}
+
 /// What the cost of features leaves to one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Grant {

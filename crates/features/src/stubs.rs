@@ -7,8 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use terrain::QUANTA_PER_METRE;
 
 use crate::choice::{Choice, Why};
+use crate::strand::Way;
 use crate::stretches::{Arm, Stretches};
-use crate::tally::{Tally, Way};
+use crate::tally::Tally;
 
 /// Shorter than this, in quanta, what dangles is taken back: 300 m.
 const STUB_MAX: i64 = 300 * QUANTA_PER_METRE as i64;

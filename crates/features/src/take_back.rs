@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use crate::choice::{Choice, Chosen, Why, ids};
 use crate::forms::Formed;
 use crate::shares::{Ledger, Limit, modules_of};
-use crate::strand::Strand;
+use crate::strand::{Strand, Way};
 use crate::stubs::take_back;
-use crate::tally::{Tally, Way};
+use crate::tally::Tally;
 use crate::{FeatureId, Place};
 
 /// What there is to take back, by load module.

@@ -2,24 +2,7 @@
 
 use crate::outlay::{End, Outlays};
 use crate::shares::{Ledger, Limit, Tier};
-
-/// What a stretch is granted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Way {
-    /// A place in [`crate::Tolerance::ALL`].
-    pub tolerance: u8,
-    /// One of the forms below.
-    pub form: u8,
-}
-
-/// Forms, each of more triangles than the one before.
-impl Way {
-    pub const LINE: u8 = 0;
-    /// A line, but a strip by which it leads onto a deck.
-    pub const ONTO_DECKS: u8 = 1;
-    pub const STRIP: u8 = 2;
-    pub const BENCH: u8 = 3;
-}
+use crate::strand::Way;
 
 /// Triangles of what is granted, in every load module.
 pub(crate) struct Tally<'a> {
