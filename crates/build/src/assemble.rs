@@ -7,8 +7,8 @@ use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use store::engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use store::{FileStamp, Measured, MeasuredModule, TileModules};
 use terrain::{
-    Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, ModuleResidual, Post, PostRect, TileId, Tin,
-    Vertex, in_turn,
+    Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, ModuleLine, ModuleResidual, Post, PostRect,
+    TileId, Tin, Vertex, in_turn,
 };
 use tin::load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, stand};
 
@@ -115,10 +115,13 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
             clip(&points, &layout, heights, &window.importance)
         }
     };
-    let lines = cut_lines(keys::lines_of(run.job, &features), features.kept.steps_per_post, &layout);
-    modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
-    let decks = cut_decks(&features.decks, features.kept.steps_per_post, &layout);
+    let steps_per_post = features.kept.steps_per_post;
+    let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
+    let bridges = cut_lines(&keys::bridges_of(&features), steps_per_post, &layout);
+    let decks: Vec<_> = decks.zip(bridges).collect();
     lift(&mut modules, &decks);
+    let lines = cut_lines(keys::lines_of(run.job, &features), steps_per_post, &layout);
+    modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
@@ -158,10 +161,12 @@ fn place_objects(
     Ok(())
 }
 
-/// Gives load modules their decks, raised onto the ground of each.
-fn lift(modules: &mut [LoadModule], decks: &[(Decks, usize)]) {
-    for (module, (decks, most)) in modules.iter_mut().zip(decks).filter(|(_, (decks, _))| !decks.is_empty()) {
-        module.decks = lift_decks(decks, module, *most);
+/// Gives load modules their decks, with how many triangles these may have and the lines of their bridges, raised onto
+/// the ground of each.
+fn lift(modules: &mut [LoadModule], decks: &[((Decks, usize), Vec<ModuleLine>)]) {
+    let are_there = modules.iter_mut().zip(decks).filter(|(_, ((decks, _), _))| !decks.is_empty());
+    for (module, ((decks, most), bridges)) in are_there {
+        module.decks = lift_decks(decks, bridges, module, *most);
     }
 }
 

@@ -236,6 +236,12 @@ pub(crate) fn lines_of<'a>(job: &Job, features: &'a TileFeatures) -> &'a [WayLin
 /// The version of the format from which on load modules have lines.
 const VERSION_WITH_LINES: u32 = 3;
 
+/// The lines of bridges in the ground of a tile, whatever its load modules have: where their decks end.
+pub(crate) fn bridges_of(features: &TileFeatures) -> Vec<WayLine> {
+    let is_bridge = |line: &&WayLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
+    features.lines.iter().filter(is_bridge).cloned().collect()
+}
+
 fn feed_line(builder: FingerprintBuilder, line: &WayLine) -> FingerprintBuilder {
     let WayLine { class, traits: LineTraits { kind, form, storey, is_kept, is_in_ground, width }, vertices } = line;
     let kind = match kind {
@@ -318,8 +324,11 @@ pub fn modules(
         true => key,
         false => key.part(FEATURES, |part| feed_surfaces(part, features)),
     };
-    let lines = lines_of(job, features);
-    let key = if lines.is_empty() { key } else { key.part(LINES, |part| part.list(lines.iter(), feed_line)) };
+    let (lines, bridges) = (lines_of(job, features), bridges_of(features));
+    let key = match lines.is_empty() && bridges.is_empty() {
+        true => key,
+        false => key.part(LINES, |part| part.list(lines.iter(), feed_line).list(bridges.iter(), feed_line)),
+    };
     let key = match objects.filter(|objects| objects.own.iter().any(|objects| !objects.is_empty())) {
         None => key,
         Some(objects) => key.part(OBJECTS, |part| feed_objects(part, objects, stamps)),

@@ -8,6 +8,8 @@ use store::{AreaLevel, FeatureLine, ReportFeatureChecks};
 use terrain::Role;
 use terrain::{LatticePoint, ModuleId, QUANTA_PER_METRE, SurfaceGround, TileFeatures, Vertex};
 
+use tin::load_modules::SPARE_MAX;
+
 use super::laid::place_text;
 
 /// A ring with its class, its corners in ascending order.
@@ -253,8 +255,8 @@ impl<'a> Decided<'a> {
             let decks = decks.get(id).copied().unwrap_or(0);
             let all = triangles.get(&at).copied().unwrap_or(0) + decks;
             let least = all - anyway.get(&at).copied().unwrap_or(0).min(all);
-            // Decks may have six corners more, each of two triangles, where ground stands above them.
-            let most = if decks == 0 { all } else { all + 12 };
+            // Decks may have more where ground stands above them.
+            let most = if decks == 0 { all } else { all + SPARE_MAX as u32 };
             !(least..=most).contains(&reserved[grid.index(*id)])
         };
         let id = grid.all().iter().find(is_wrong)?;

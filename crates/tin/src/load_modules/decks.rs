@@ -6,8 +6,8 @@ use terrain::{Decks, FeatureSurface, LatticePoint, ModuleVertex};
 
 use crate::load_modules::Layout;
 
-/// Triangles that lifting may add in a load module at most.
-const SPARE_MAX: usize = 12;
+/// Triangles that lifting may add in a load module at most: six corners, each of two.
+pub const SPARE_MAX: usize = 12;
 
 /// Quanta north and east together from which an edge has a corner in its middle: 4 m.
 const MIDDLE_MIN: i64 = 4 * 128;

@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use terrain::{Decks, LineStorey, LoadModule, ModuleLine, ModuleVertex};
+use terrain::{Decks, LoadModule, ModuleLine, ModuleVertex};
 
 /// Quanta that a deck may lie under the ground, as rounding puts it.
 const ROUNDING: f64 = 1.0;
@@ -26,7 +26,7 @@ const SHARE_MIN: f64 = 0.5;
 /// The same where there is no room for one, and corners at ends of decks rise, too.
 const SHARE_MIN_FREE: f64 = 0.1;
 
-/// The same at last, to no cap: a deck that rises steeply is better than one in the ground.
+/// The same at last, when no corner can be added: a deck that rises steeply is better than one in the ground.
 const SHARE_MIN_LAST: f64 = 0.3;
 
 /// How often all places are gone through at most where no corner can be added.
@@ -42,14 +42,14 @@ const NEARLY: f64 = 0.9;
 const ADDED_FOR: f64 = 4.0;
 
 /// The decks of a load module, raised onto the triangles of the ground that stand above them as far as corners reach,
-/// with at most so many triangles.
-pub fn lift_decks(decks: &Decks, ground: &LoadModule, most: usize) -> Decks {
+/// with at most so many triangles. They belong to `bridges`, of which the load module need not have lines.
+pub fn lift_decks(decks: &Decks, bridges: &[ModuleLine], ground: &LoadModule, most: usize) -> Decks {
     let all: BTreeSet<[u16; 2]> = decks.vertices.iter().map(|vertex| place(*vertex)).collect();
     // Where there is room for few corners, one between both rims may do better than one on either, or none at all.
     let tries = [(BTreeSet::new(), most, true), (all.clone(), most, false), (all, 0, false)];
     let mut best: Option<(Decks, f64)> = None;
     for (free, most, on_rims) in tries {
-        let (lifted, missing) = lifted(decks, ground, free, (most, on_rims));
+        let (lifted, missing) = lifted(decks, (ground, bridges), free, (most, on_rims));
         if best.as_ref().is_none_or(|(_, least)| missing < *least) {
             best = Some((lifted, missing));
         }
@@ -64,13 +64,13 @@ pub fn lift_decks(decks: &Decks, ground: &LoadModule, most: usize) -> Decks {
 /// added lie on rims first, or not.
 fn lifted(
     drawn: &Decks,
-    ground: &LoadModule,
+    (ground, bridges): (&LoadModule, &[ModuleLine]),
     mut free: BTreeSet<[u16; 2]>,
     (most, on_rims): (usize, bool),
 ) -> (Decks, f64) {
     let mut decks = drawn.clone();
     loop {
-        let mut lift = Lift::of(ground, &decks);
+        let mut lift = Lift::of(ground, &decks, bridges);
         let mut reaches = lift.reaches(ground);
         let [usual, last] = [lift.usual(&free), lift.last(&reaches)];
         lift.raise_inside(&mut reaches, &usual);
@@ -182,11 +182,11 @@ struct Reach {
 
 impl<'a> Lift<'a> {
     /// Decks whose vertices on the sides have been raised onto the ground.
-    fn of(ground: &LoadModule, decks: &'a Decks) -> Self {
+    fn of(ground: &LoadModule, decks: &'a Decks, bridges: &[ModuleLine]) -> Self {
         let heights = decks.vertices.iter().map(|vertex| f64::from(vertex.z)).collect();
         let is_inside = |vertex: &ModuleVertex| place(*vertex).iter().all(|at| 0 < *at && *at < ground.side);
         let are_inside = decks.vertices.iter().map(is_inside).collect();
-        let ends = decks.vertices.iter().map(|vertex| at_end(*vertex, ground)).collect();
+        let ends = decks.vertices.iter().map(|vertex| at_end(*vertex, bridges, ground)).collect();
         let top = top(ground.vertices.iter().map(|vertex| f64::from(vertex.z)));
         let mut lift = Self { decks, heights, are_inside, ends, top };
         lift.raise_sides(ground);
@@ -350,15 +350,14 @@ impl<'a> Lift<'a> {
 }
 
 /// The height of the ground at a vertex where a deck ends on it: beside an end of a bridge's line, within its width.
-fn at_end(vertex: ModuleVertex, ground: &LoadModule) -> Option<f64> {
+fn at_end(vertex: ModuleVertex, bridges: &[ModuleLine], ground: &LoadModule) -> Option<f64> {
     let is_inside = |end: &ModuleVertex| place(*end).iter().all(|at| 0 < *at && *at < ground.side);
     let is_beside = |line: &ModuleLine| {
         let reach = END_PART * f64::from(line.traits.width);
         let ends = [line.vertices.first(), line.vertices.last()].into_iter().flatten();
-        line.traits.storey == LineStorey::Bridge
-            && ends.filter(|end| is_inside(end)).any(|end| apart(at(*end), at(vertex)) <= reach)
+        ends.filter(|end| is_inside(end)).any(|end| apart(at(*end), at(vertex)) <= reach)
     };
-    if !ground.lines.iter().any(is_beside) {
+    if !bridges.iter().any(is_beside) {
         return None;
     }
     let triangles = ground.triangles.iter().map(|triangle| triangle.map(|at| ground.vertices[usize::from(at)]));
@@ -460,7 +459,7 @@ fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{LineForm, LineKind, LineTraits, ModuleId, ModuleResidual};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleResidual};
 
     const SIDE: u16 = 12_800;
 
@@ -497,19 +496,19 @@ mod tests {
 
     /// How far the ground stands above decks at most.
     fn deepest(decks: &Decks, ground: &LoadModule) -> f64 {
-        let reaches = Lift::of(ground, decks).reaches(ground);
+        let reaches = Lift::of(ground, decks, &[]).reaches(ground);
         reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max)
     }
 
     #[test]
     fn a_deck_above_the_ground_stays_as_it_is() {
-        assert_eq!(lift_decks(&deck(2000), &hill(1000, 0), 4), deck(2000));
+        assert_eq!(lift_decks(&deck(2000), &[], &hill(1000, 0), 4), deck(2000));
     }
 
     #[test]
     fn a_deck_through_a_hill_rises_over_it_and_its_ends_stay() {
         let ground = hill(1000, 0);
-        let lifted = lift_decks(&deck(500), &ground, 4);
+        let lifted = lift_decks(&deck(500), &[], &ground, 4);
         assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
         assert!(400.0 < deepest(&deck(500), &ground) && deepest(&lifted, &ground) == 0.0);
         assert!(lifted.vertices.contains(&vertex(0, 6000, 500)), "its ends stay");
@@ -523,7 +522,7 @@ mod tests {
         let at = |(x, y)| vertex(x, y, 0);
         // From side to side, over the top of the hill.
         let [a, b, c, d] = [(0, 6390), (SIDE, 6390), (SIDE, 6410), (0, 6410)].map(at);
-        let lifted = lift_decks(&Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]), &ground, 4);
+        let lifted = lift_decks(&Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]), &[], &ground, 4);
         assert_eq!(lifted.check(SIDE), Ok(()));
         assert!((lifted.triangles.len(), lifted.vertices.len()) == (4, 5), "{lifted:?}");
         assert!(lifted.vertices.contains(&vertex(6400, 6400, 2999)), "{lifted:?}");
@@ -537,7 +536,7 @@ mod tests {
         let [a, b, c, d] = [(0, 6390), (300, 6390), (300, 6410), (0, 6410)].map(at);
         let [e, f] = [(SIDE, 6390), (SIDE, 6410)].map(at);
         let decks = Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3), ([b, e, c], 3), ([e, f, c], 3)]);
-        let lifted = lift_decks(&decks, &ground, 4);
+        let lifted = lift_decks(&decks, &[], &ground, 4);
         assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
         let [before, after] = [&decks, &lifted].map(|decks| deepest(decks, &ground));
         assert!(2000.0 < before && after < ADDED_FOR, "{before} {after} {lifted:?}");
@@ -548,7 +547,7 @@ mod tests {
         // A lip of 400 quanta close to the side, where corners stay, and no room for one more.
         let mut ground = hill(0, 0);
         ground.vertices[3] = vertex(20, 6400, 400);
-        let lifted = lift_decks(&deck(0), &ground, 2);
+        let lifted = lift_decks(&deck(0), &[], &ground, 2);
         // Several places ask for it, one after the other.
         assert!(lifted.vertices.iter().all(|vertex| vertex.z <= 3 * 400), "{lifted:?}");
     }
@@ -556,7 +555,7 @@ mod tests {
     #[test]
     fn on_the_side_of_a_load_module_a_deck_rises_by_what_is_there_alone() {
         let sides = |ground: &LoadModule| {
-            let lifted = lift_decks(&deck(500), ground, 4);
+            let lifted = lift_decks(&deck(500), &[], ground, 4);
             assert!(deepest(&lifted, ground) == 0.0);
             lifted.vertices.into_iter().filter(|vertex| vertex.x == 0).collect::<Vec<ModuleVertex>>()
         };
@@ -567,14 +566,14 @@ mod tests {
 
     #[test]
     fn ends_of_a_deck_stay_on_the_ground_and_corners_are_added_between_them() {
-        let mut ground = hill(1000, 0);
+        let ground = hill(1000, 0);
         let [a, b, c, d] = [(2000, 6000), (10_800, 6000), (10_800, 6640), (2000, 6640)].map(|(x, y)| vertex(x, y, 313));
         let deck = Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]);
         let highest_end = |lifted: &Decks| {
             let is_end = |vertex: &&ModuleVertex| [2000, 10_800].contains(&vertex.x);
             lifted.vertices.iter().filter(is_end).map(|vertex| vertex.z).max()
         };
-        assert!(Some(600) < highest_end(&lift_decks(&deck, &ground, 8)), "nothing says that they are ends");
+        assert!(Some(600) < highest_end(&lift_decks(&deck, &[], &ground, 8)), "nothing says that they are ends");
         let traits = LineTraits {
             kind: LineKind::Travelled,
             form: LineForm::Strip,
@@ -584,8 +583,7 @@ mod tests {
             width: 640,
         };
         let vertices = vec![vertex(2000, 6320, 313), vertex(10_800, 6320, 313)];
-        ground.lines = vec![ModuleLine { class: 3, traits, vertices }];
-        let lifted = lift_decks(&deck, &ground, 8);
+        let lifted = lift_decks(&deck, &[ModuleLine { class: 3, traits, vertices }], &ground, 8);
         assert!(highest_end(&lifted) <= Some(320) && deepest(&lifted, &ground) <= ADDED_FOR, "{lifted:?}");
     }
 }

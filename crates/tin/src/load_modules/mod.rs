@@ -13,7 +13,7 @@ pub use layout::Layout;
 mod classes;
 mod concatenate;
 mod decks;
-pub use decks::cut_decks;
+pub use decks::{SPARE_MAX, cut_decks};
 mod lift;
 pub use lift::lift_decks;
 mod lines;

@@ -1,5 +1,6 @@
 //! Roads, junctions, bridges and tunnels.
 
+use build::ground::GamingArea;
 use features::Kind;
 use store::Folder;
 use terrain::Role;
@@ -158,4 +159,35 @@ fn a_road_through_the_corner_of_four_tiles_and_one_along_the_border_are_built() 
         line("highway=track", &[(SIDE_M, 200.0), (SIDE_M, 1800.0)]),
     ];
     Drawing::new(|east, north| 500.0 + 0.05 * east + 0.08 * north, &drawn).built();
+}
+
+#[test]
+fn decks_are_the_same_whether_load_modules_have_lines_or_not() {
+    // Ridges and hollows along a slope, with bridges of 20 m between two bends of roads.
+    let ground = |east: f64, north: f64| 500.0 + 0.4 * north + 12.0 * (east / 17.0).sin() * (north / 23.0).cos();
+    let road = |number: i32| {
+        let north = 110.0 + 90.0 * f64::from(number);
+        let bridge = 300.0 + 70.0 * f64::from(number);
+        [
+            line("highway=primary", &[(bridge - 200.0, north), (bridge, north)]),
+            line("highway=primary bridge=yes layer=1", &[(bridge, north), (bridge + 20.0, north)]),
+            line("highway=primary", &[(bridge + 20.0, north), (bridge + 220.0, north)]),
+        ]
+    };
+    let drawn: Vec<Drawn> = (0..18).flat_map(road).collect();
+    let decks = |modules: &str| {
+        let words = Words { modules: modules.into(), ..Drawing::words() };
+        let drawing = Drawing::of(words, ground, &drawn);
+        drawing.scene.build("area.tdb", 2);
+        let folder = Folder::new(drawing.scene.path("area.tdb"));
+        let manifest = folder.manifest().unwrap();
+        let tiles = GamingArea::new(&drawing.scene.job).unwrap().tiles;
+        let modules = tiles.iter().flat_map(|tile| folder.read_modules(&manifest, *tile).unwrap().1);
+        modules.map(|module| (module.lines.len(), module.decks)).collect::<Vec<_>>()
+    };
+    let [with, without] = [decks("format = 3"), decks("format = 2")];
+    assert!(with.iter().any(|(lines, _)| 0 < *lines) && without.iter().all(|(lines, _)| *lines == 0));
+    assert!(with.iter().filter(|(_, decks)| !decks.is_empty()).count() > 4);
+    let only = |of: &[(usize, terrain::Decks)]| of.iter().map(|(_, decks)| decks.clone()).collect::<Vec<_>>();
+    assert!(only(&with) == only(&without), "decks of bridges differ");
 }
