@@ -1,8 +1,7 @@
 //! Decks of bridges, cut at the lines between load modules.
 
-use std::collections::BTreeMap;
-
-use terrain::{Decks, FeatureSurface, LatticePoint, ModuleVertex};
+use terrain::mesh::constrained_delaunay;
+use terrain::{Decks, FeatureSurface, LatticePoint, ModuleVertex, Vertex};
 
 use crate::load_modules::Layout;
 
@@ -20,38 +19,53 @@ struct Corner {
     z: i64,
 }
 
-/// The decks in each load module of a tile, row by row: polygons above the ground, told apart into triangles and cut at
-/// the squares' sides. What two load modules have on the line between them is the same.
+impl Corner {
+    fn place(&self) -> LatticePoint {
+        LatticePoint::new(self.y as i32, self.x as i32)
+    }
+
+    /// Quanta north and east together to another.
+    fn apart(&self, other: &Corner) -> i64 {
+        (self.x - other.x).abs() + (self.y - other.y).abs()
+    }
+}
+
+/// The decks in each load module of a tile, row by row: polygons above the ground, cut at the squares' sides and told
+/// apart into triangles there. What two load modules have on the line between them is the same.
 ///
 /// Places of `decks` are in steps of a lattice of so many steps between posts. With the decks of each load module goes
 /// how many triangles they may have when they are lifted: limits are held against one for each corner of polygons that
 /// reach into it.
 pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout) -> Vec<(Decks, usize)> {
     let step = i64::from(layout.spacing.quanta_per_post() / steps_per_post);
-    let side = layout.grid.side_cells * steps_per_post;
+    let side = i64::from(layout.side());
     let mut pieces = vec![Vec::new(); layout.modules.count()];
     let mut corners = vec![0; layout.modules.count()];
     for deck in decks {
-        let span = |of: fn(&LatticePoint) -> i32| {
-            let all = || deck.ring.iter().map(|vertex| of(&vertex.at).div_euclid(side));
+        let corner = |vertex: &Vertex| Corner {
+            x: i64::from(vertex.at.col) * step,
+            y: i64::from(vertex.at.row) * step,
+            z: i64::from(vertex.height),
+        };
+        let ring: Vec<Corner> = deck.ring.iter().map(corner).collect();
+        let crossed = crossed(&ring, side);
+        let span = |of: fn(&Corner) -> i64| {
+            let all = || ring.iter().map(|corner| of(corner).div_euclid(side));
             all().min().unwrap_or(0)..=all().max().unwrap_or(-1)
         };
-        for row in span(|at| at.row) {
-            let slots = span(|at| at.col).filter_map(|col| layout.slot(row, col));
-            slots.for_each(|slot| corners[slot] += deck.ring.len());
-        }
-        let mut at_corners = BTreeMap::new();
-        let places: Vec<LatticePoint> = deck.ring.iter().map(|vertex| vertex.at).collect();
-        for triangle in ears(&places) {
-            let corners = triangle.map(|corner| {
-                let vertex = deck.ring[corner];
-                Corner {
-                    x: i64::from(vertex.at.col) * step,
-                    y: i64::from(vertex.at.row) * step,
-                    z: i64::from(vertex.height),
-                }
-            });
-            cut(corners, deck.class, (layout, &mut at_corners), &mut pieces);
+        for (row, col) in span(|at| at.y).flat_map(|row| span(|at| at.x).map(move |col| (row, col))) {
+            let Some(slot) = layout.slot(row as i32, col as i32) else { continue };
+            corners[slot] += ring.len();
+            let [west, south] = [col * side, row * side];
+            let local = |corner: Corner| ModuleVertex {
+                y: (corner.y - south) as u16,
+                x: (corner.x - west) as u16,
+                z: corner.z as i32,
+            };
+            let is_in = |at: &Corner| (west..=west + side).contains(&at.x) && (south..=south + side).contains(&at.y);
+            let lines = [[west, south], [west + side, south], [west, south + side], [west + side, south + side]];
+            let within = triangles(&crossed, is_in, &lines.map(|place| inside(&ring, place)).concat());
+            pieces[slot].extend(within.into_iter().map(|triangle| (triangle.map(local), deck.class)));
         }
     }
     let most = |(decks, corners): (Decks, usize)| {
@@ -61,146 +75,82 @@ pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout)
     pieces.into_iter().map(Decks::of_triangles).zip(corners).map(most).collect()
 }
 
-/// Triangles of a simple ring by places in it, counter-clockwise, whichever way it runs; an ear at a time. What is left
-/// of a ring that is not simple is left out.
-fn ears(ring: &[LatticePoint]) -> Vec<[usize; 3]> {
-    let cross = |a: usize, b: usize, c: usize| terrain::geometry::orient(ring[a], ring[b], ring[c]);
-    let area: i64 = (1..ring.len().saturating_sub(1)).map(|corner| cross(0, corner, corner + 1)).sum();
-    let mut left: Vec<usize> = (0..ring.len()).collect();
-    if area < 0 {
-        left.reverse();
-    }
-    let mut triangles = Vec::with_capacity(ring.len().saturating_sub(2));
-    while 3 <= left.len() {
-        let at = |corner: usize| left[corner % left.len()];
-        let is_ear = |corner: &usize| {
-            let [a, b, c] = [at(corner + left.len() - 1), at(*corner), at(corner + 1)];
-            let holds = |p: usize| 0 <= cross(a, b, p) && 0 <= cross(b, c, p) && 0 <= cross(c, a, p);
-            let is_free = left.iter().all(|&p| [a, b, c].contains(&p) || !holds(p));
-            cross(a, b, c) == 0 || (0 < cross(a, b, c) && is_free)
-        };
-        let Some(ear) = (0..left.len()).find(is_ear) else { break };
-        let triangle = [at(ear + left.len() - 1), at(ear), at(ear + 1)];
-        if cross(triangle[0], triangle[1], triangle[2]) != 0 {
-            triangles.push(triangle);
+/// A ring with corners where its edges cross lines between load modules, and in the middle of every long edge from one
+/// line to another, so that decks can be raised between them.
+fn crossed(ring: &[Corner], side: i64) -> Vec<Corner> {
+    let mut all = Vec::with_capacity(2 * ring.len());
+    for (&from, &to) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+        let mut edge = vec![from, to];
+        for axis in [Axis::X, Axis::Y] {
+            let (low, high) = (axis.of(from).min(axis.of(to)), axis.of(from).max(axis.of(to)));
+            let lines = low.div_euclid(side) + 1..=(high - 1).div_euclid(side);
+            edge.extend(lines.map(|line| crossing(from, to, axis, line * side)));
         }
-        left.remove(ear);
-    }
-    triangles
-}
-
-/// Cuts a triangle of a deck into the squares of load modules it lies in, those of other tiles with them: `at_corners`
-/// has the height of the deck where four squares meet, which its first triangle there decides for all.
-fn cut(
-    corners: [Corner; 3],
-    class: u8,
-    (layout, at_corners): (&Layout, &mut BTreeMap<[i64; 2], i64>),
-    pieces: &mut [Vec<([ModuleVertex; 3], u8)>],
-) {
-    let side = i64::from(layout.side());
-    let span = |of: fn(&Corner) -> i64| {
-        let low = corners.iter().map(of).min().unwrap_or(0).div_euclid(side);
-        let high = corners.iter().map(of).max().unwrap_or(0);
-        (low, high.div_euclid(side) - i64::from(high.rem_euclid(side) == 0))
-    };
-    let ((south, north), (west, east)) = (span(|corner| corner.y), span(|corner| corner.x));
-    for row in south..=north {
-        for col in west..=east {
-            let slot = layout.slot(row as i32, col as i32);
-            let [west, south] = [col * side, row * side];
-            let mut polygon = corners.to_vec();
-            let lines = [
-                (Axis::X, west, true),
-                (Axis::X, west + side, false),
-                (Axis::Y, south, true),
-                (Axis::Y, south + side, false),
-            ];
-            for (axis, line, keep_above) in lines {
-                polygon = kept(&polygon, axis, line, keep_above);
-            }
-            let lines = lines.map(|(axis, line, _)| (axis, line));
-            polygon.iter_mut().for_each(|corner| *corner = shared(*corner, corners, lines, at_corners));
-            polygon.dedup();
-            let on_sides = |corner: &Corner| {
-                [corner.x == west, corner.x == west + side, corner.y == south, corner.y == south + side]
-            };
-            let polygon = with_middles(&polygon, &on_sides);
-            let local = |corner: Corner| ModuleVertex {
-                y: (corner.y - south) as u16,
-                x: (corner.x - west) as u16,
-                z: corner.z as i32,
-            };
-            for pair in polygon.windows(2).skip(1) {
-                let triangle = [polygon[0], pair[0], pair[1]];
-                let [a, b, c] = triangle;
-                let is_turned = 0 < (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-                if let Some(slot) = slot.filter(|_| is_turned) {
-                    pieces[slot].push((triangle.map(local), class));
-                }
+        edge.sort_by_key(|at| (from.apart(at), at.z));
+        edge.dedup_by_key(|at| from.apart(at));
+        for pair in edge.windows(2) {
+            all.push(pair[0]);
+            let on = |at: &Corner, axis: Axis| axis.of(*at) % side == 0;
+            let are_on = |at: &Corner| on(at, Axis::X) || on(at, Axis::Y);
+            let is_along = |axis: Axis| on(&pair[0], axis) && axis.of(pair[0]) == axis.of(pair[1]);
+            let is_across = pair.iter().all(are_on) && !is_along(Axis::X) && !is_along(Axis::Y);
+            if is_across && MIDDLE_MIN <= pair[0].apart(&pair[1]) {
+                let middle = |of: fn(&Corner) -> i64| (of(&pair[0]) + of(&pair[1])).div_euclid(2);
+                all.push(Corner { x: middle(|at| at.x), y: middle(|at| at.y), z: middle(|at| at.z) });
             }
         }
     }
-}
-
-/// A corner of a piece of a triangle as all pieces there have it: on a line from the edge that crosses it alone, since
-/// one that was cut before crosses elsewhere by a rounding; where lines meet at one height.
-fn shared(
-    corner: Corner,
-    triangle: [Corner; 3],
-    lines: [(Axis, i64); 4],
-    at_corners: &mut BTreeMap<[i64; 2], i64>,
-) -> Corner {
-    if triangle.contains(&corner) {
-        return corner;
-    }
-    let on: Vec<(Axis, i64)> = lines.into_iter().filter(|(axis, line)| axis.of(corner) == *line).collect();
-    match on[..] {
-        [(axis, line)] => {
-            let [a, b, c] = triangle;
-            let crosses = |(a, b): &(Corner, Corner)| {
-                let [a, b] = [*a, *b].map(|end| axis.of(end));
-                a.min(b) < line && line < a.max(b)
-            };
-            let crossings = [(a, b), (b, c), (c, a)].into_iter().filter(crosses);
-            let off = |at: &Corner| (at.x - corner.x).abs() + (at.y - corner.y).abs() + (at.z - corner.z).abs();
-            crossings.map(|(a, b)| crossing(a, b, axis, line)).min_by_key(off).unwrap_or(corner)
-        }
-        [_, _] => {
-            let z = *at_corners.entry([corner.x, corner.y]).or_insert_with(|| height_at(triangle, corner));
-            Corner { z, ..corner }
-        }
-        _ => corner,
-    }
-}
-
-/// The height of a triangle's plane at a place.
-fn height_at([a, b, c]: [Corner; 3], place: Corner) -> i64 {
-    let cross = |from: Corner, to: Corner, at: Corner| {
-        i128::from((to.x - from.x) * (at.y - from.y)) - i128::from((to.y - from.y) * (at.x - from.x))
-    };
-    let (of_b, of_c, whole) = (cross(place, c, a), cross(a, b, place), cross(a, b, c));
-    let rise = of_b * i128::from(b.z - a.z) + of_c * i128::from(c.z - a.z);
-    a.z + (2 * rise + whole).div_euclid(2 * whole) as i64
-}
-
-/// A polygon with a corner in the middle of every long edge from one side of the load module to another, so that decks
-/// can be raised between them; one of these comes first, if there are any.
-fn with_middles(polygon: &[Corner], on_sides: &dyn Fn(&Corner) -> [bool; 4]) -> Vec<Corner> {
-    let mut all = Vec::with_capacity(2 * polygon.len());
-    let mut first = 0;
-    for (at, corner) in polygon.iter().enumerate() {
-        let next = &polygon[(at + 1) % polygon.len()];
-        let [here, there] = [corner, next].map(on_sides);
-        let is_across = here.contains(&true) && there.contains(&true) && (0..4).all(|side| !here[side] || !there[side]);
-        all.push(*corner);
-        if is_across && MIDDLE_MIN <= (corner.x - next.x).abs() + (corner.y - next.y).abs() {
-            let middle = |of: fn(&Corner) -> i64| (of(corner) + of(next)).div_euclid(2);
-            first = all.len();
-            all.push(Corner { x: middle(|at| at.x), y: middle(|at| at.y), z: middle(|at| at.z) });
-        }
-    }
-    all.rotate_left(first);
     all
+}
+
+/// The Delaunay triangles inside a ring, counter-clockwise, whichever way it runs, of those of its corners that are
+/// kept and of others inside. Edges that would cross one before them are left out.
+fn triangles(ring: &[Corner], is_kept: impl Fn(&Corner) -> bool, others: &[Corner]) -> Vec<[Corner; 3]> {
+    let mut corners: Vec<Corner> = ring.iter().filter(|corner| is_kept(corner)).chain(others).copied().collect();
+    corners.sort_by_key(Corner::place);
+    corners.dedup_by_key(|corner| corner.place());
+    let places: Vec<LatticePoint> = corners.iter().map(Corner::place).collect();
+    let number = |corner: &Corner| places.binary_search(&corner.place()).ok().map(|at| at as u32);
+    let pairs = || ring.iter().zip(ring.iter().cycle().skip(1));
+    let edges: Vec<[u32; 2]> = pairs().filter_map(|(from, to)| Some([number(from)?, number(to)?])).collect();
+    let is_inside = |triangle: &[Corner; 3]| {
+        // Thrice its middle, so that it is whole.
+        let [x, y] = [Axis::X, Axis::Y].map(|axis| triangle.iter().map(|corner| axis.of(*corner)).sum());
+        let crosses = |(from, to): &(&Corner, &Corner)| {
+            let (low, high) = if from.y < to.y { (from, to) } else { (to, from) };
+            let along = (high.x - low.x) * (y - 3 * low.y) - (high.y - low.y) * (x - 3 * low.x);
+            3 * low.y <= y && y < 3 * high.y && 0 < along
+        };
+        pairs().filter(crosses).count() % 2 == 1
+    };
+    let (triangles, _) = constrained_delaunay(&places, &edges);
+    triangles.into_iter().map(|triangle| triangle.map(|at| corners[at as usize])).filter(is_inside).collect()
+}
+
+/// A corner at a place inside a ring at the height of its triangle there, which is the same for all load modules that
+/// meet there; none where the place is outside.
+fn inside(ring: &[Corner], [x, y]: [i64; 2]) -> Vec<Corner> {
+    let span = |axis: Axis| {
+        let all = || ring.iter().map(|corner| axis.of(*corner));
+        all().min().unwrap_or(0)..=all().max().unwrap_or(-1)
+    };
+    if !span(Axis::X).contains(&x) || !span(Axis::Y).contains(&y) {
+        return Vec::new();
+    }
+    let place = Corner { x, y, z: 0 };
+    let of = triangles(ring, |_| true, &[]).into_iter().find_map(|[a, b, c]| {
+        let [of_a, of_b, of_c] = [turn(place, b, c), turn(place, c, a), turn(place, a, b)];
+        let whole = turn(a, b, c);
+        let rise = of_b * i128::from(b.z - a.z) + of_c * i128::from(c.z - a.z);
+        let z = a.z + (2 * rise + whole).div_euclid(2 * whole) as i64;
+        [of_a, of_b, of_c].iter().all(|of| 0 <= *of).then_some(Corner { z, ..place })
+    });
+    of.into_iter().collect()
+}
+
+/// Doubled area of a triangle, positive when counter-clockwise.
+fn turn(a: Corner, b: Corner, c: Corner) -> i128 {
+    i128::from((b.x - a.x) * (c.y - a.y)) - i128::from((b.y - a.y) * (c.x - a.x))
 }
 
 #[derive(Clone, Copy)]
@@ -216,23 +166,6 @@ impl Axis {
             Axis::Y => corner.y,
         }
     }
-}
-
-/// What of a convex polygon lies on one side of a line.
-fn kept(polygon: &[Corner], axis: Axis, line: i64, keep_above: bool) -> Vec<Corner> {
-    let is_kept = |corner: Corner| if keep_above { line <= axis.of(corner) } else { axis.of(corner) <= line };
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
-    for (at, &corner) in polygon.iter().enumerate() {
-        let next = polygon[(at + 1) % polygon.len()];
-        if is_kept(corner) {
-            kept.push(corner);
-        }
-        let [here, there] = [axis.of(corner), axis.of(next)];
-        if (here < line && line < there) || (there < line && line < here) {
-            kept.push(crossing(corner, next, axis, line));
-        }
-    }
-    kept
 }
 
 /// Where an edge crosses a line, from its ends alone, whichever way it runs.
@@ -252,7 +185,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use terrain::{ModuleGrid, Spacing, SurfaceGround, Vertex};
+    use terrain::{ModuleGrid, Spacing, SurfaceGround};
 
     fn layout() -> Layout {
         let grid = ModuleGrid { rows: 2, cols: 3, side_cells: 20 };
@@ -323,7 +256,8 @@ mod tests {
             cut[index].vertices.iter().filter(|v| v.x == x).map(|v| (v.y, v.z)).collect()
         };
         let (west, east) = (on(0, layout.side()), on(1, 0));
-        assert!(2 <= west.len() && west == east, "{west:?} {east:?}");
+        assert!(west.len() == 2 && west == east, "{west:?} {east:?}");
+        assert!(cut.iter().all(|decks| [0, 2].contains(&decks.triangles.len())), "each half has four corners");
         let step = 25 * 128 / 64;
         let places: Vec<(i64, i64)> = ring.iter().map(|(row, col, _)| (i64::from(*row), i64::from(*col))).collect();
         let doubled: i64 = (0..4)

@@ -8,7 +8,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use terrain::{Decks, LoadModule, ModuleLine, ModuleVertex};
+use terrain::geometry::{in_circle, orient};
+use terrain::{Decks, LatticePoint, LoadModule, ModuleLine, ModuleVertex};
 
 /// Quanta that a deck may lie under the ground, as rounding puts it.
 const ROUNDING: f64 = 1.0;
@@ -35,40 +36,15 @@ const LAST_TIMES: usize = 4;
 /// The least part of a height that a corner has to make up to have a say in it.
 const WEIGHT_MIN: f64 = 1e-9;
 
-/// The part of what is missing most that is about as much.
-const NEARLY: f64 = 0.9;
-
 /// Quanta under the ground for which a corner is added.
 const ADDED_FOR: f64 = 4.0;
 
 /// The decks of a load module, raised onto the triangles of the ground that stand above them as far as corners reach,
 /// with at most so many triangles. They belong to `bridges`, of which the load module need not have lines.
-pub fn lift_decks(decks: &Decks, bridges: &[ModuleLine], ground: &LoadModule, most: usize) -> Decks {
-    let all: BTreeSet<[u16; 2]> = decks.vertices.iter().map(|vertex| place(*vertex)).collect();
-    // Where there is room for few corners, one between both rims may do better than one on either, or none at all.
-    let tries = [(BTreeSet::new(), most, true), (all.clone(), most, false), (all, 0, false)];
-    let mut best: Option<(Decks, f64)> = None;
-    for (free, most, on_rims) in tries {
-        let (lifted, missing) = lifted(decks, (ground, bridges), free, (most, on_rims));
-        if best.as_ref().is_none_or(|(_, least)| missing < *least) {
-            best = Some((lifted, missing));
-        }
-        if missing <= ADDED_FOR {
-            break;
-        }
-    }
-    best.map(|(lifted, _)| lifted).unwrap_or_default()
-}
-
-/// The same, and what is still missing most, where corners at these places rise wherever they are, and those that are
-/// added lie on rims first, or not.
-fn lifted(
-    drawn: &Decks,
-    (ground, bridges): (&LoadModule, &[ModuleLine]),
-    mut free: BTreeSet<[u16; 2]>,
-    (most, on_rims): (usize, bool),
-) -> (Decks, f64) {
+pub fn lift_decks(drawn: &Decks, bridges: &[ModuleLine], ground: &LoadModule, most: usize) -> Decks {
     let mut decks = drawn.clone();
+    // Places where corners rise wherever they are.
+    let mut free: BTreeSet<[u16; 2]> = BTreeSet::new();
     loop {
         let mut lift = Lift::of(ground, &decks, bridges);
         let mut reaches = lift.reaches(ground);
@@ -76,9 +52,6 @@ fn lifted(
         lift.raise_inside(&mut reaches, &usual);
         let mut far: Vec<&Reach> = reaches.iter().filter(|reach| ADDED_FOR < reach.missing).collect();
         far.sort_by(|one, other| other.missing.total_cmp(&one.missing));
-        // Of places that miss about as much, one on the rim: no sliver is left beside it that nothing could raise.
-        let about = NEARLY * far.first().map_or(0.0, |reach| reach.missing);
-        far.sort_by_key(|reach| on_rims && (reach.missing < about || !is_on_rim(&decks, reach)));
         let has_room = decks.triangles.len() + 2 <= most;
         let more = far.iter().filter(|_| has_room).find_map(|reach| with_corner((drawn, &decks), reach, ground.side));
         if let Some(more) = more {
@@ -94,20 +67,9 @@ fn lifted(
                     lift.raise_inside(&mut reaches, &last);
                 }
             }
-            return (lift.raised(), reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max));
+            return lift.raised();
         }
     }
-}
-
-/// Whether a place of a triangle is on an edge of it that no other triangle has.
-fn is_on_rim(decks: &Decks, reach: &Reach) -> bool {
-    let corners = decks.triangles[reach.triangle];
-    let is_rim = |across: usize| {
-        let ends = [corners[(across + 1) % 3], corners[(across + 2) % 3]];
-        let has = |triangle: &&[u16; 3]| ends.iter().all(|end| triangle.contains(end));
-        reach.weights[across].abs() < WEIGHT_MIN && decks.triangles.iter().filter(has).count() == 1
-    };
-    (0..3).any(is_rim)
 }
 
 /// Decks with one more corner at a place of a triangle, and of its neighbour where it lies on an edge; nothing where
@@ -130,18 +92,50 @@ fn with_corner((drawn, decks): (&Decks, &Decks), reach: &Reach, side: u16) -> Op
     let edges = |of: [ModuleVertex; 3]| [[of[0], of[1]], [of[1], of[2]], [of[2], of[0]]];
     let split = edges(of).into_iter().find(is_near);
     let mut soup = Vec::with_capacity(decks.triangles.len() + 2);
+    let mut around = Vec::new();
     for (number, (triangle, class)) in decks.triangles.iter().zip(&decks.classes).enumerate() {
         let own = corners(triangle);
         let is_split = |edge: &[ModuleVertex; 2]| split.is_some_and(|[a, b]| *edge == [a, b] || *edge == [b, a]);
         if number == reach.triangle || edges(own).iter().any(is_split) {
             let rest = edges(own).into_iter().filter(|edge| !is_split(edge));
-            soup.extend(rest.map(|[from, to]| ([from, to, added], *class)));
+            around.extend(rest.map(|[from, to]| ([from, to, added], *class)));
         } else {
             soup.push((own, *class));
         }
     }
     let is_turned = |[a, b, c]: &[ModuleVertex; 3]| 0.0 < cross(self::at(*a), self::at(*b), self::at(*c));
-    soup.iter().all(|(corners, _)| is_turned(corners)).then(|| Decks::of_triangles(soup))
+    around.iter().all(|(corners, _)| is_turned(corners)).then(|| {
+        flip_around(&mut around, &mut soup);
+        Decks::of_triangles(around.into_iter().chain(soup))
+    })
+}
+
+/// Corners of a triangle of decks, and its class.
+type DeckTriangle = ([ModuleVertex; 3], u8);
+
+/// Flips edges until triangles around a corner, which is the last of each, are those of Delaunay (Lawson 1977): they
+/// take what they gain from the rest.
+fn flip_around(around: &mut Vec<DeckTriangle>, rest: &mut Vec<DeckTriangle>) {
+    let mut settled = 0;
+    while let Some(&([from, to, corner], class)) = around.get(settled) {
+        let has = |(of, other): &DeckTriangle| *other == class && of.contains(&from) && of.contains(&to);
+        let mut across = rest.iter().enumerate().filter(|(_, of)| has(of));
+        let (Some((at, &(of, _))), None) = (across.next(), across.next()) else {
+            settled += 1;
+            continue;
+        };
+        let far = of.into_iter().find(|vertex| ![from, to].contains(vertex)).unwrap_or(corner);
+        let place = |vertex: ModuleVertex| LatticePoint::new(i32::from(vertex.y), i32::from(vertex.x));
+        let [a, b, c, d] = [from, to, corner, far].map(place);
+        let is_convex = [[b, a, d], [a, d, c], [d, b, c]].into_iter().all(|[a, b, c]| 0 < orient(a, b, c));
+        if is_convex && 0 < in_circle(a, b, c, d) {
+            rest.swap_remove(at);
+            around[settled] = ([from, far, corner], class);
+            around.push(([far, to, corner], class));
+        } else {
+            settled += 1;
+        }
+    }
 }
 
 /// Quanta from an edge within which a place lies on it.
@@ -540,6 +534,20 @@ mod tests {
         assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
         let [before, after] = [&decks, &lifted].map(|decks| deepest(decks, &ground));
         assert!(2000.0 < before && after < ADDED_FOR, "{before} {after} {lifted:?}");
+    }
+
+    #[test]
+    fn triangles_beside_a_corner_that_is_added_are_no_slivers() {
+        // A ridge across a deck, close to one of its ends on the side of the load module, where corners stay.
+        let at = |(x, y)| vertex(x, y, if x == 200 { 3000 } else { 0 });
+        let places = [(0, 0), (200, 0), (400, 0), (SIDE, 0), (SIDE, SIDE), (400, SIDE), (200, SIDE), (0, SIDE)];
+        let triangles = vec![[0, 1, 6], [0, 6, 7], [1, 2, 5], [1, 5, 6], [2, 3, 4], [2, 4, 5]];
+        let mut ground = hill(0, 0);
+        (ground.vertices, ground.triangles) = (places.map(at).to_vec(), triangles);
+        let lifted = lift_decks(&deck(0), &[], &ground, 8);
+        assert_eq!(lifted.check(SIDE), Ok(()));
+        assert!(deepest(&lifted, &ground) <= ADDED_FOR, "{} {lifted:?}", deepest(&lifted, &ground));
+        assert!(lifted.vertices.iter().all(|vertex| vertex.z < 3300), "{lifted:?}");
     }
 
     #[test]
