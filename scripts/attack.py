@@ -134,8 +134,10 @@ class Attack:
         grid, places, areas = self.scene.grid, [], []
         quanta = attack_scenes.QUANTA
         if "features" in sections:
-            near = 12 * grid.spacing_m + 60
-            for _, geometry, _ in self.scene.network.features:
+            for _, geometry, tags in self.scene.network.features:
+                # Slopes beside roads end 60 m away, those beside water 150 m (docs/guides/features.md).
+                is_water = not {"waterway", "natural"}.isdisjoint(tags)
+                near = 12 * grid.spacing_m + (150 if is_water else 60)
                 rings = geometry if isinstance(geometry[0], list) else []
                 areas += rings[:1]
                 for line in rings or [geometry]:
