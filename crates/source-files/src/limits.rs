@@ -67,12 +67,16 @@ pub(crate) const RINGS_MAX: usize = 1 << 14;
 /// Bytes of a Shapefile's shapes, and of its table: both are held in memory while features are read.
 pub(crate) const SHAPEFILE_BYTES_MAX: u64 = 512 << 20;
 /// Bytes of the footer of a Parquet file: those of Overture, with some hundred row groups, have some millions.
+#[cfg(feature = "geoparquet")]
 pub(crate) const PARQUET_FOOTER_BYTES_MAX: u64 = 64 << 20;
 /// Bytes of a page of a Parquet file once unpacked: pages have a million, but some writers make one of a column.
+#[cfg(feature = "geoparquet")]
 pub(crate) const PARQUET_PAGE_BYTES_MAX: u64 = 1 << 28;
 /// Values of the columns of a Parquet file that are read, whatever its size.
+#[cfg(feature = "geoparquet")]
 pub(crate) const PARQUET_VALUES_FREE: u64 = 1 << 20;
 /// Values beside that for each byte of it: absent ones take hardly any, but each row has a geometry.
+#[cfg(feature = "geoparquet")]
 pub(crate) const PARQUET_VALUES_A_BYTE: u64 = 4;
 
 /// Bytes that a vertex takes on its way: as it is read, projected, cut and kept.
