@@ -116,12 +116,16 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
         }
     };
     let steps_per_post = features.kept.steps_per_post;
+    let lines = cut_lines(&features.lines, steps_per_post, &layout);
+    let bridges = |lines: &Vec<ModuleLine>| -> Vec<ModuleLine> {
+        lines.iter().filter(|line| keys::has_deck(&line.traits)).cloned().collect()
+    };
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
-    let bridges = cut_lines(&keys::bridges_of(&features), steps_per_post, &layout);
-    let decks: Vec<_> = decks.zip(bridges).collect();
+    let decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
     lift(&mut modules, &decks);
-    let lines = cut_lines(keys::lines_of(run.job, &features), steps_per_post, &layout);
-    modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
+    if keys::have_lines(run.job) {
+        modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
+    }
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;

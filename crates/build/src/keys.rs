@@ -228,18 +228,14 @@ fn feed_surfaces(builder: FingerprintBuilder, features: &TileFeatures) -> Finger
     builder.list(surfaces.iter(), feed).list(shaped.iter(), feed).list(decks.iter(), feed)
 }
 
-/// The lines of a tile that its load modules have: none where the job's format leaves them out.
-pub(crate) fn lines_of<'a>(job: &Job, features: &'a TileFeatures) -> &'a [WayLine] {
-    if VERSION_WITH_LINES <= job.modules.format { &features.lines } else { &[] }
+/// Whether load modules have lines of ways, which they do from version 3 of the format on.
+pub(crate) fn have_lines(job: &Job) -> bool {
+    3 <= job.modules.format
 }
 
-/// The version of the format from which on load modules have lines.
-const VERSION_WITH_LINES: u32 = 3;
-
-/// The lines of bridges in the ground of a tile, whatever its load modules have: where their decks end.
-pub(crate) fn bridges_of(features: &TileFeatures) -> Vec<WayLine> {
-    let is_bridge = |line: &&WayLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
-    features.lines.iter().filter(is_bridge).cloned().collect()
+/// Whether a line is that of a bridge with a deck, which ends where the line does.
+pub(crate) fn has_deck(traits: &LineTraits) -> bool {
+    traits.storey == LineStorey::Bridge && traits.is_kept
 }
 
 fn feed_line(builder: FingerprintBuilder, line: &WayLine) -> FingerprintBuilder {
@@ -324,11 +320,10 @@ pub fn modules(
         true => key,
         false => key.part(FEATURES, |part| feed_surfaces(part, features)),
     };
-    let (lines, bridges) = (lines_of(job, features), bridges_of(features));
-    let key = match lines.is_empty() && bridges.is_empty() {
-        true => key,
-        false => key.part(LINES, |part| part.list(lines.iter(), feed_line).list(bridges.iter(), feed_line)),
-    };
+    // Decks are lifted by lines of bridges, whatever load modules have.
+    let is_needed = |line: &&WayLine| have_lines(job) || has_deck(&line.traits);
+    let lines: Vec<&WayLine> = features.lines.iter().filter(is_needed).collect();
+    let key = if lines.is_empty() { key } else { key.part(LINES, |part| part.list(lines.into_iter(), feed_line)) };
     let key = match objects.filter(|objects| objects.own.iter().any(|objects| !objects.is_empty())) {
         None => key,
         Some(objects) => key.part(OBJECTS, |part| feed_objects(part, objects, stamps)),

@@ -1,9 +1,11 @@
 //! Decks of bridges, cut at the lines between load modules.
 
+use terrain::geometry::orient;
 use terrain::mesh::constrained_delaunay;
 use terrain::{Decks, FeatureSurface, LatticePoint, ModuleVertex, Vertex};
 
 use crate::load_modules::Layout;
+use crate::load_modules::stand::is_inside;
 
 /// Triangles that lifting may add in a load module at most: six corners, each of two.
 pub const SPARE_MAX: usize = 12;
@@ -63,8 +65,9 @@ pub fn cut_decks(decks: &[FeatureSurface], steps_per_post: i32, layout: &Layout)
                 z: corner.z as i32,
             };
             let is_in = |at: &Corner| (west..=west + side).contains(&at.x) && (south..=south + side).contains(&at.y);
-            let lines = [[west, south], [west + side, south], [west, south + side], [west + side, south + side]];
-            let within = triangles(&crossed, is_in, &lines.map(|place| inside(&ring, place)).concat());
+            let meet = [[west, south], [west + side, south], [west, south + side], [west + side, south + side]];
+            let inside: Vec<Corner> = meet.into_iter().filter_map(|place| corner_inside(&ring, place)).collect();
+            let within = triangles(&crossed, is_in, &inside);
             pieces[slot].extend(within.into_iter().map(|triangle| (triangle.map(local), deck.class)));
         }
     }
@@ -113,44 +116,35 @@ fn triangles(ring: &[Corner], is_kept: impl Fn(&Corner) -> bool, others: &[Corne
     let number = |corner: &Corner| places.binary_search(&corner.place()).ok().map(|at| at as u32);
     let pairs = || ring.iter().zip(ring.iter().cycle().skip(1));
     let edges: Vec<[u32; 2]> = pairs().filter_map(|(from, to)| Some([number(from)?, number(to)?])).collect();
-    let is_inside = |triangle: &[Corner; 3]| {
-        // Thrice its middle, so that it is whole.
-        let [x, y] = [Axis::X, Axis::Y].map(|axis| triangle.iter().map(|corner| axis.of(*corner)).sum());
-        let crosses = |(from, to): &(&Corner, &Corner)| {
-            let (low, high) = if from.y < to.y { (from, to) } else { (to, from) };
-            let along = (high.x - low.x) * (y - 3 * low.y) - (high.y - low.y) * (x - 3 * low.x);
-            3 * low.y <= y && y < 3 * high.y && 0 < along
-        };
-        pairs().filter(crosses).count() % 2 == 1
+    let plan = |corner: &Corner| [corner.x as f64, corner.y as f64];
+    let walls: Vec<[[f64; 2]; 2]> = pairs().map(|(from, to)| [plan(from), plan(to)]).collect();
+    let is_within = |triangle: &[Corner; 3]| {
+        let [a, b, c] = triangle.each_ref().map(plan);
+        is_inside(&walls, [0, 1].map(|axis| (a[axis] + b[axis] + c[axis]) / 3.0))
     };
     let (triangles, _) = constrained_delaunay(&places, &edges);
-    triangles.into_iter().map(|triangle| triangle.map(|at| corners[at as usize])).filter(is_inside).collect()
+    triangles.into_iter().map(|triangle| triangle.map(|at| corners[at as usize])).filter(is_within).collect()
 }
 
 /// A corner at a place inside a ring at the height of its triangle there, which is the same for all load modules that
 /// meet there; none where the place is outside.
-fn inside(ring: &[Corner], [x, y]: [i64; 2]) -> Vec<Corner> {
+fn corner_inside(ring: &[Corner], [x, y]: [i64; 2]) -> Option<Corner> {
     let span = |axis: Axis| {
         let all = || ring.iter().map(|corner| axis.of(*corner));
         all().min().unwrap_or(0)..=all().max().unwrap_or(-1)
     };
     if !span(Axis::X).contains(&x) || !span(Axis::Y).contains(&y) {
-        return Vec::new();
+        return None;
     }
     let place = Corner { x, y, z: 0 };
-    let of = triangles(ring, |_| true, &[]).into_iter().find_map(|[a, b, c]| {
+    triangles(ring, |_| true, &[]).into_iter().find_map(|[a, b, c]| {
+        let turn = |a: Corner, b: Corner, c: Corner| i128::from(orient(a.place(), b.place(), c.place()));
         let [of_a, of_b, of_c] = [turn(place, b, c), turn(place, c, a), turn(place, a, b)];
         let whole = turn(a, b, c);
         let rise = of_b * i128::from(b.z - a.z) + of_c * i128::from(c.z - a.z);
         let z = a.z + (2 * rise + whole).div_euclid(2 * whole) as i64;
         [of_a, of_b, of_c].iter().all(|of| 0 <= *of).then_some(Corner { z, ..place })
-    });
-    of.into_iter().collect()
-}
-
-/// Doubled area of a triangle, positive when counter-clockwise.
-fn turn(a: Corner, b: Corner, c: Corner) -> i128 {
-    i128::from((b.x - a.x) * (c.y - a.y)) - i128::from((b.y - a.y) * (c.x - a.x))
+    })
 }
 
 #[derive(Clone, Copy)]

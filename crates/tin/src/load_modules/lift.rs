@@ -52,7 +52,8 @@ pub fn lift_decks(drawn: &Decks, bridges: &[ModuleLine], ground: &LoadModule, mo
         lift.raise_inside(&mut reaches, &usual);
         let mut far: Vec<&Reach> = reaches.iter().filter(|reach| ADDED_FOR < reach.missing).collect();
         far.sort_by(|one, other| other.missing.total_cmp(&one.missing));
-        let more = far.iter().find_map(|reach| {
+        let has_room = decks.triangles.len() < most;
+        let more = far.iter().filter(|_| has_room).find_map(|reach| {
             // On a rim a corner adds one triangle, elsewhere two.
             with_corner((drawn, &decks), reach, ground.side).filter(|more| more.triangles.len() <= most)
         });

@@ -121,7 +121,8 @@ fn left(a: [f64; 2], b: [f64; 2], at: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (at[1] - a[1]) - (b[1] - a[1]) * (at[0] - a[0])
 }
 
-fn is_inside(walls: &[[[f64; 2]; 2]], at: [f64; 2]) -> bool {
+/// Whether a place lies inside of a ring, given as its edges in any order.
+pub(crate) fn is_inside(walls: &[[[f64; 2]; 2]], at: [f64; 2]) -> bool {
     let crosses =
         |[a, b]: &[[f64; 2]; 2]| (a[1] <= at[1]) != (b[1] <= at[1]) && (0.0 < left(*a, *b, at)) == (a[1] < b[1]);
     walls.iter().filter(|wall| crosses(wall)).count() % 2 == 1
