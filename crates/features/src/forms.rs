@@ -122,12 +122,24 @@ pub(crate) fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each,
         formed = forming.round_together(scope).0;
     }
     let Forming { sharing, thinned, .. } = forming;
-    let decided = (&formed.points[..], &formed.faces[..]);
+    let points = within(&formed, site);
+    let decided = (&points[..], &formed.faces[..]);
     formed.middles = middles(graded, (&pieces, &sharing.wide), (strands, &thinned), decided, site);
     remark_rooms(network, &pieces, &sharing.wide, &mut remarks);
     formed.remarks.append(&mut remarks);
     Remark::sort(&mut formed.remarks);
     formed
+}
+
+/// The points at which edges in the area end: one on its border may end such as lie beyond it alone.
+fn within(formed: &Formed, site: &Site) -> Vec<(Place, i32)> {
+    let mut is_within = vec![false; formed.points.len()];
+    for ends in formed.edges.iter().map(|edge| [edge.a, edge.b].map(|point| point as usize)) {
+        let [a, b] = ends.map(|point| formed.points[point].0);
+        ends.into_iter().for_each(|point| is_within[point] |= site.holds_middle(a, b));
+    }
+    let points = formed.points.iter().zip(is_within);
+    points.filter(|((place, _), is_within)| *is_within || !site.on_border(*place)).map(|(point, _)| *point).collect()
 }
 
 /// How much is rounded together.

@@ -3,7 +3,7 @@
 //! They are what a map draws and what a simulator drives along. Where a line crosses one between load modules it has a
 //! station, so that its parts in both meet there.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use terrain::{LineForm, LineKind, LineStorey, LineTraits, Vertex};
 
@@ -226,6 +226,41 @@ fn in_culverts(middle: Middle, points: &[(Place, i32)]) -> Vec<Middle> {
     parts.collect()
 }
 
+/// Places at which the middle of what is kept ends although its way goes on, with its class and its feature. `family`
+/// says of classes what hangs together. Ways that thinning made the same line are one here, as they are in load modules.
+pub(crate) fn loose_ends(middles: &[Middle], family: &BTreeMap<u16, u8>, site: &Site) -> Vec<(Place, u16, FeatureId)> {
+    #[derive(Default)]
+    struct Meeting {
+        ends: Vec<(u16, FeatureId)>,
+        is_passed: bool,
+        goes_on: bool,
+    }
+    let (mut meetings, mut seen) = (BTreeMap::<_, Meeting>::new(), HashSet::new());
+    let is_inside = |stations: &[(Place, i32)]| stations.windows(2).any(|ends| site.holds_middle(ends[0].0, ends[1].0));
+    for Middle { class, traits, id, stations } in middles {
+        let is_way = traits.kind != LineKind::Breakline && is_inside(stations);
+        if !is_way || !seen.insert((class, traits.is_kept, &stations[..])) {
+            continue;
+        }
+        let last = stations.len() - 1;
+        for (number, &(place, _)) in stations.iter().enumerate() {
+            let is_end = number == 0 || number == last;
+            let key = (traits.kind == LineKind::Channel, place, family.get(class).copied());
+            let meeting = meetings.entry(key).or_default();
+            match (traits.is_kept, is_end) {
+                (true, true) if traits.storey == LineStorey::Tunnel => meeting.is_passed = true,
+                (true, true) => meeting.ends.push((*class, *id)),
+                (true, false) => meeting.is_passed = true,
+                // What passes on a bridge or in a tunnel does not meet what ends below or above it.
+                (false, _) => meeting.goes_on |= is_end || traits.storey == LineStorey::Ground,
+            }
+        }
+    }
+    let is_loose = |of: &Meeting| of.ends.len() == 1 && !of.is_passed && of.goes_on;
+    let found = meetings.into_iter().filter(|((_, place, _), of)| is_loose(of) && !site.on_border(*place));
+    found.flat_map(|((_, place, _), of)| of.ends.into_iter().map(move |(class, id)| (place, class, id))).collect()
+}
+
 /// The stations that a line needs which is no edge.
 fn thinned_out(stations: Vec<(Place, i32)>, site: &Site) -> Vec<(Place, i32)> {
     let station = |&(place, height): &(Place, i32)| Station { place, height, stays: site.on_line(place), flat: [0; 2] };
@@ -334,5 +369,28 @@ mod tests {
         assert!(!kept.is_empty() && !out.is_empty());
         assert_eq!(kept.len() + out.len(), 100);
         assert!(middles.iter().all(|middle| middle.traits.fit()));
+    }
+
+    #[test]
+    fn what_ends_where_its_way_goes_on_ends_there_also_where_thinning_made_two_ways_one() {
+        let sources = vec![
+            way(1, "highway=track", &[(10.0, 20.0), (20.0, 20.0)]),
+            way(2, "highway=primary", &[(20.0, 20.0), (30.0, 30.0)]),
+        ];
+        let formed = formed(sources, |_, _| 0.0);
+        let [kept, next] = [1, 2].map(|number| of_number(&formed, number)[0].clone());
+        let out = Middle { traits: LineTraits { is_kept: false, ..next.traits }, ..next.clone() };
+        let twin = Middle { id: FeatureId { number: 9, ..kept.id }, ..kept.clone() };
+        let end = (out.stations[0].0, kept.class, kept.id);
+        let family = BTreeMap::from([(kept.class, 0), (next.class, 0)]);
+        let found = |middles: &[&Middle]| {
+            loose_ends(&middles.iter().copied().cloned().collect::<Vec<Middle>>(), &family, &site())
+        };
+        assert_eq!(found(&[&kept, &out]), [end]);
+        assert_eq!(found(&[&kept, &twin, &out]), [end]);
+        assert_eq!(found(&[&kept, &next]), []);
+        assert_eq!(found(&[&kept]), []);
+        let below = Middle { traits: LineTraits { storey: LineStorey::Tunnel, ..kept.traits }, ..kept.clone() };
+        assert_eq!(found(&[&below, &out]), [], "a portal is no end");
     }
 }

@@ -13,6 +13,7 @@ use terrain::Each;
 use crate::choice::{Amiss, Choice, Chosen, Why, ids};
 use crate::clean::Notes;
 use crate::forms::{Formed, Scope, Surface, form};
+use crate::middles::loose_ends;
 use crate::outlay::Outlays;
 use crate::pieces::{onto_decks, pieces};
 use crate::room::Sharing;
@@ -20,7 +21,6 @@ use crate::shares::{Cost, Ledger, Shares, Tier, cost, taken};
 use crate::strand::{Graded, Role, Strand, Way};
 use crate::stretches::{About, Part, Stretches};
 use crate::strokes::strokes;
-use crate::stubs::loose_ends;
 use crate::take_back::TakingBack;
 use crate::{FeatureId, Flaw, Form, Grant, Grants, Kind, Place, Remark, Remedy, Site};
 
@@ -155,15 +155,8 @@ impl Reserved {
                 amounts.lakes_kept += u32::from(way.is_ok());
             }
         }
-        let granted: Vec<Option<Way>> = chosen.ways.iter().map(|way| way.ok()).collect();
-        let ends = loose_ends(choice, &granted).into_iter();
-        reserved.loose_ends = ends
-            .filter_map(|(joint, stretch)| {
-                let (place, class) =
-                    (choice.stretches.joints[joint as usize], choice.stretches.all[stretch as usize].class);
-                Some((place, class, ids(choice, stretch, strands).next()?))
-            })
-            .collect();
+        let family: BTreeMap<u16, u8> = choice.stretches.all.iter().map(|of| (of.class, of.family())).collect();
+        reserved.loose_ends = loose_ends(&reserved.formed.middles, &family, choice.site);
         reserved
     }
 }

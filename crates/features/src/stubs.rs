@@ -2,7 +2,7 @@
 //! junction, and small pieces of the road network that hang together with nothing.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use terrain::QUANTA_PER_METRE;
 
@@ -174,19 +174,4 @@ impl Dangling<'_> {
         }
         found
     }
-}
-
-/// Joints at which what is granted ends although its source goes on, with the stretch that ends there.
-pub(crate) fn loose_ends(choice: &Choice, granted: &[Option<Way>]) -> BTreeMap<u32, u32> {
-    let dangling = Dangling { choice, stroke_of: Vec::new() };
-    let mut ends = BTreeMap::new();
-    for (stretch, of) in (0..).zip(&choice.stretches.all) {
-        let is_there = of.is_inside && granted[stretch as usize].is_some();
-        for joint in of.joints.into_iter().flatten().filter(|_| is_there) {
-            if dangling.is_loose(granted, stretch, joint) {
-                ends.insert(joint, stretch);
-            }
-        }
-    }
-    ends
 }
