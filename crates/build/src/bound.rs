@@ -180,7 +180,7 @@ fn without_limit(
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
     let features = TileFeatures { kept: features, ..TileFeatures::none(tile) };
-    let refinement = Refinement { task, optimising, most: Most::AsTask, features };
+    let refinement = Refinement { task, optimising, most: Most::AsTask, features, spacing: None };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, None, &sides).tin,

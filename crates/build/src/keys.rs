@@ -371,7 +371,7 @@ pub(crate) fn measured(run: &Run, modules: Fingerprint) -> Key {
 }
 
 fn feed_rules(builder: FingerprintBuilder, refinement: &Refinement) -> FingerprintBuilder {
-    let Refinement { task, optimising, most, features: _ } = refinement;
+    let Refinement { task, optimising, most, features: _, spacing: _ } = refinement;
     let builder = feed_growth(builder, task).list(task.kept.iter(), feed_post);
     let builder = builder.maybe(*optimising, |builder, optimising| {
         let job::Optimising { effort, height_fit, lattice, sight } = optimising;

@@ -7,8 +7,8 @@ use fidelity::Bodies;
 use job::{Effort, Job, Method, Optimising};
 use terrain::limits::Allowance;
 use terrain::{
-    Dem, HeightFit, Importance, Lattice, LatticePoint, Post, PostRect, StopReason, THOUSANDTHS, TileFeatures, TileTin,
-    Tin, Vertex,
+    Dem, HeightFit, Importance, Lattice, LatticePoint, Post, PostRect, Spacing, StopReason, THOUSANDTHS, TileFeatures,
+    TileTin, Tin, Vertex,
 };
 use tin::optimiser::{Budget, Optimised, Task, fill, optimise, overshoot, weave_in};
 use tin::{Frame, Rule, Stop, TileTask};
@@ -31,6 +31,8 @@ pub struct Refinement {
     pub most: Most,
     /// What features put into it: vertices and edges that it keeps whatever it is refined to, and level water.
     pub features: TileFeatures,
+    /// How far posts are apart, where features are to have no walls beside them.
+    pub spacing: Option<Spacing>,
 }
 
 /// Where there are no load modules, the most a mesh may have.
@@ -176,6 +178,7 @@ impl Refinement {
         Task {
             held,
             features: self.features.kept.clone(),
+            spacing: self.spacing,
             open: task.seams,
             line_step: match task.frame {
                 Frame::Sides { side_cells, .. } => Some(side_cells),

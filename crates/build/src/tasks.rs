@@ -31,7 +31,8 @@ pub fn tile_refinement(
 ) -> Refinement {
     let barred = features.kept.barred_posts(area.tiling.rect(tile));
     let task = TileTask { barred, ..tile_task(job, area, tile, budget, inherited) };
-    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.clone() }
+    let spacing = Some(area.frame.spacing);
+    Refinement { task, optimising: optimising(job), most: Most::AsTask, features: features.clone(), spacing }
 }
 
 /// The growth of one tile, inheriting `inherited` from its lower-ranked neighbours.

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::clean::Notes;
+use crate::rings::encloses;
 use crate::strand::{Role, Strand};
 use crate::{FallOptions, FeatureLattice, Flaw, Kind, Outline, Place, Remark, Remedy, Ring};
 
@@ -98,6 +99,7 @@ pub fn level(
         }
     }
     join_bodies(outlines, &mut waters.lakes, dams);
+    join_nested(outlines, &mut waters.lakes, lattice, remarks);
     waters
 }
 
@@ -223,6 +225,45 @@ fn join_bodies(outlines: &[Outline], lakes: &mut [Lake], dams: &dyn Fn(Place) ->
     }
 }
 
+/// What lies inside another lake, and on none of its islands, is water of that lake and lies at its level.
+fn join_nested(outlines: &[Outline], lakes: &mut [Lake], lattice: FeatureLattice, remarks: &mut Vec<Remark>) {
+    let bounds = |lake: &Lake| {
+        let places = || outlines[lake.outline as usize].places();
+        let [rows, cols] = [|place: Place| place.row, |place: Place| place.col].map(|at| {
+            let along = || places().map(at);
+            (along().min().unwrap_or(0), along().max().unwrap_or(0))
+        });
+        [rows, cols]
+    };
+    let bounds: Vec<[(i32, i32); 2]> = lakes.iter().map(bounds).collect();
+    for inner in 0..lakes.len() {
+        let Some(first) = outlines[lakes[inner].outline as usize].places().next() else { continue };
+        let is_within = |outer: usize| {
+            let within = |axis: usize| {
+                bounds[outer][axis].0 < bounds[inner][axis].0 && bounds[inner][axis].1 < bounds[outer][axis].1
+            };
+            let rings = || &outlines[lakes[outer].outline as usize].rings;
+            within(0) && within(1) && rings().iter().filter(|ring| encloses(&ring.places, first)).count() % 2 == 1
+        };
+        // Of several that do, the outermost.
+        let Some(outer) = (0..lakes.len()).filter(|&outer| is_within(outer)).min_by_key(|&outer| bounds[outer][0].0)
+        else {
+            continue;
+        };
+        let (from, Lake { level, is_fixed, body, .. }) = (lakes[inner].body, lakes[outer].clone());
+        if from == body {
+            continue;
+        }
+        if lakes[inner].level != level {
+            let mut notes = Notes { id: outlines[lakes[inner].outline as usize].id, lattice, remarks };
+            notes.write_at(first, Flaw::LevelsDisagree, Remedy::Levelled);
+        }
+        for lake in lakes.iter_mut().filter(|lake| lake.body == from) {
+            *lake = Lake { level, is_fixed, body, ..lake.clone() };
+        }
+    }
+}
+
 /// Cubic metres between the shore and the level plus a quantum, over a post's width outside.
 fn fill(outline: &Outline, shore: &[Option<i32>], level: i32, lattice: FeatureLattice) -> i64 {
     let post = f64::from(lattice.steps_per_post()) * lattice.metres_per_step();
@@ -290,7 +331,7 @@ fn strands(outline: &Outline, role: Role, height: &dyn Fn(Place, usize) -> i32) 
 mod tests {
     use super::*;
     use crate::samples::{ground_at, rounded, site, way};
-    use crate::{Rounded, Source};
+    use crate::{Rounded, Shape, Source};
 
     fn lake(number: i64, more: &str, west: f64, east: f64) -> Source {
         let ring = [(west, 10.0), (east, 10.0), (east, 30.0), (west, 30.0), (west, 10.0)];
@@ -361,6 +402,25 @@ mod tests {
         let mut found = levels(sources(), flat, &|place| site().lattice.posts_of(place)[0] == 20.0).0;
         found.sort_unstable();
         assert_eq!(found, [101, 103]);
+    }
+
+    #[test]
+    fn a_lake_inside_another_lies_at_its_level_and_one_on_an_island_at_its_own() {
+        let square = |low: f64, high: f64| [(low, low), (high, low), (high, high), (low, high), (low, low)];
+        let lake = |number, level, low, high| way(number, &format!("natural=water ele={level}"), &square(low, high));
+        let found = |sources| {
+            let (mut found, flaws, _) = levels(sources, |_, _| 104.0, &none);
+            found.sort_unstable();
+            (found, flaws.contains(&Flaw::LevelsDisagree))
+        };
+        assert_eq!(found(vec![lake(1, 103, 10.0, 40.0), lake(2, 101, 20.0, 30.0)]), (vec![103, 103], true));
+        let (mut ring, island) = (lake(1, 103, 10.0, 40.0), lake(3, 0, 15.0, 35.0));
+        let rings = [&ring, &island].map(|source| match &source.shape {
+            Shape::Line(positions) => positions.clone(),
+            Shape::Polygon(_) => Vec::new(),
+        });
+        ring.shape = Shape::Polygon(rings.into());
+        assert_eq!(found(vec![ring, lake(2, 101, 20.0, 30.0)]), (vec![101, 103], false));
     }
 
     #[test]

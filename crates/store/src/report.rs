@@ -152,13 +152,13 @@ pub struct ReportPerModule {
 /// Use of the limit per window of 4 km.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReportPerWindow {
-    /// Largest count of any window of 8 x 8 load modules.
+    /// Largest count of any 4 km square of load modules, 8 x 8 of 500 m.
     pub max: u64,
     /// What the job allows.
     pub limit: u64,
     /// Windows above it.
     pub over: u64,
-    /// Largest count of any 9 x 9 load modules: bounds a 4 km square at any offset.
+    /// Largest count of any square that is one load module wider, 9 x 9 of 500 m: bounds a 4 km square at any offset.
     pub worst_9x9: u64,
 }
 

@@ -69,7 +69,7 @@ fn limits(report: &Report) -> Option<String> {
     let over = mean_breach.map_or("0", |_| "1");
     table.row(["  mean of load modules", &mean, &format!("{:.2}", module.mean_limit), over]);
     table.row(["  largest 4 km square".into(), number(window.max), number(window.limit), number(window.over)]);
-    table.row(["  largest 9 x 9 load modules".into(), number(window.worst_9x9), String::new(), String::new()]);
+    table.row(["  any 4 km square, at most".into(), number(window.worst_9x9), String::new(), String::new()]);
     table.row(["  pool".into(), number(pool.used), number(pool.size), String::new()]);
     Some(table.text(0) + &before_removals(report))
 }

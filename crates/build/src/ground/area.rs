@@ -2,8 +2,9 @@
 
 use job::{Borders, Budget as PointBudget, Edges, Job};
 use schedule::RankedTasks;
+use source_files::Crs;
 use terrain::limits::Windows;
-use terrain::{GridFrame, ModuleGrid, ModuleRect, PostRect, Side, TileId};
+use terrain::{DEGREE_M, GridFrame, ModuleGrid, ModuleRect, PostRect, Side, TileId};
 use tin::tiling::{Budget, BudgetFault, Tiling};
 
 use crate::ground::GroundError;
@@ -185,4 +186,32 @@ fn planned(area: &GamingArea, tile: TileId, ranks: &[usize]) -> PlannedTile {
         inherits_from: inherits.filter_map(|side| tiling.beyond(tile, side)).collect(),
         after: tiling.neighbours(tile).into_iter().filter(|&other| tiling.rank(other) < tiling.rank(tile)).collect(),
     }
+}
+
+/// Parts by which metres of an area's system may differ from metres of its ground; those of a UTM zone do by 0.001.
+const STRETCH_MAX: f64 = 0.01;
+
+/// What a person should know of a system whose metres are other than those of the ground in the middle of the area.
+pub fn stretched(epsg: u32, area: &GamingArea) -> Option<String> {
+    const STEP_M: f64 = 1000.0;
+    let (own, degrees) = (Crs::from_epsg(epsg).ok()?, Crs::from_epsg(4326).ok()?);
+    let middle = |at: [f64; 2], posts: [usize; 2]| [0, 1].map(|axis| at[axis] + posts[axis] as f64 / 2.0);
+    let (frame, rect) = (area.frame, area.rect);
+    let [col, row] = middle([f64::from(rect.west), f64::from(rect.south)], [rect.cells_wide(), rect.cells_high()]);
+    let spacing_m = frame.spacing.metres();
+    let [east, north] = [frame.origin_east_m + col * spacing_m, frame.origin_north_m + row * spacing_m];
+    let at = |east: f64, north: f64| own.to(&degrees, [east, north]);
+    let from = at(east, north)?;
+    let ground_m = |to: [f64; 2]| {
+        let longitude = (to[0] - from[0]) * from[1].to_radians().cos();
+        longitude.hypot(to[1] - from[1]) * DEGREE_M
+    };
+    let part = (ground_m(at(east + STEP_M, north)?) + ground_m(at(east, north + STEP_M)?)) / (2.0 * STEP_M);
+    let metres = 100.0 * part;
+    (STRETCH_MAX < (part - 1.0).abs()).then(|| {
+        format!(
+            "area.crs: 100 m of EPSG:{epsg} are {metres:.1} m of ground here, and load modules, widths and distances \
+             are measured in its metres; in a UTM zone both are alike"
+        )
+    })
 }

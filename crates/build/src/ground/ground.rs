@@ -12,7 +12,7 @@ use store::Folder;
 use terrain::mask::{Mask, Surroundings};
 use terrain::{Dem, GridFrame, HOLE_CLASS, PostRect, Spacing, TileFeatures, TileId};
 
-use crate::ground::area::GamingArea;
+use crate::ground::area::{GamingArea, stretched};
 use crate::ground::burn::burn;
 use crate::ground::census::Census;
 use crate::ground::excluded::GamingAreaFrame;
@@ -95,6 +95,7 @@ impl Ground {
         };
         let Opened { source, voids, mut warnings, accuracy_m, range_m } = opened;
         let bounds = range_m.map(Bounds::of_metres);
+        warnings.extend(stretched(job.area.epsg, area));
         let mut relief = Relief { source, frame: area.frame, water: None, bounds };
         let polygons = match &job.dem.water {
             None => Vec::new(),

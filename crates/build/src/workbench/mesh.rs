@@ -278,7 +278,7 @@ impl<'a> TinJob<'a> {
             Some(triangles) if self.tiles.len() == 1 => Most::Triangles(triangles),
             _ => Most::AsTask,
         };
-        Refinement { task, optimising, most, features: TileFeatures::none(TileId { row: 0, col: 0 }) }
+        Refinement { task, optimising, most, features: TileFeatures::none(TileId { row: 0, col: 0 }), spacing: None }
     }
 
     fn task(&self, tile: TileId, seams: SeamSides, inherited: Vec<terrain::Post>, points: Option<usize>) -> TileTask {

@@ -64,6 +64,9 @@ impl Sampled<'_> {
                 grounds.push(dem);
             }
         }
+        if grounds.is_empty() {
+            return Ok(None);
+        }
         let modules: usize = grounds.iter().map(|dem| dem.rect().cells_wide() * dem.rect().cells_high()).sum();
         let triangles = modules / (self.side_cells * self.side_cells) * self.triangles;
         let spacing_m = self.grid.spacing.metres();

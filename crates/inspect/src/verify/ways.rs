@@ -228,13 +228,23 @@ impl<'a> Ground<'a> {
         if let Some(&there) = self.square.heights.get(&at) {
             return off_m(there.into());
         }
-        let under = |triangle: &[u16; 3]| {
+        let under = |triangle: &[u16; 3], [north, east]: [f64; 2]| {
             let corner = |v: &u16| self.square.module.vertices[usize::from(*v)];
             let corners = triangle.each_ref().map(corner).map(|of| [f64::from(of.x), f64::from(of.y), f64::from(of.z)]);
             let [y, x] = [at.0 - self.square.reach()[0], at.1 - self.square.reach()[1]].map(|at| at as f64);
-            height_at(&corners, [x, y]).map(off_m)
+            height_at(&corners, [x + east, y + north]).map(off_m)
         };
-        self.square.module.triangles.iter().filter_map(under).reduce(f64::min).unwrap_or(0.0)
+        let least = |off: [f64; 2]| {
+            let triangles = self.square.module.triangles.iter();
+            triangles.filter_map(|triangle| under(triangle, off)).reduce(f64::min)
+        };
+        let off_m = least([0.0; 2]).unwrap_or(0.0);
+        if off_m <= OFF_MAX_M {
+            return off_m;
+        }
+        // Beside a road that ends high above the ground, what rounding moves lies off by more than it was moved.
+        let aside = self.aside;
+        [[aside, 0.0], [-aside, 0.0], [0.0, aside], [0.0, -aside]].into_iter().filter_map(least).fold(off_m, f64::min)
     }
 
     /// Parts of the line between two places with their heights, from 0 to 1, along which neither an edge nor a triangle

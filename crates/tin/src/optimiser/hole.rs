@@ -25,6 +25,7 @@ pub(crate) struct Hole {
     /// Whether a corner is given; not asked where there are no features.
     is_given: [bool; CORNERS_MAX],
     has_features: bool,
+    quanta_per_step: f64,
     /// Sums west of the chord from corner i to corner j, for i < j: `forth[i][..][j]` and `back[j][..][i]`.
     forth: [[[f64; WIDE]; SUMS]; CORNERS_MAX],
     back: [[[f64; WIDE]; SUMS]; CORNERS_MAX],
@@ -43,6 +44,7 @@ impl Default for Hole {
             height: [0.0; WIDE],
             is_given: [false; N],
             has_features: false,
+            quanta_per_step: f64::INFINITY,
             forth: [[[0.0; WIDE]; SUMS]; N],
             back: [[[0.0; WIDE]; SUMS]; N],
             best: [[0.0; N]; N],
@@ -69,7 +71,7 @@ impl Hole {
             (self.at[i], self.height[i], self.is_given[i]) = (vertex.at, vertex.height, vertex.hold.is_fixed());
             (self.x[i], self.y[i]) = vertex.at.posts();
         }
-        self.has_features = sheet.has_features;
+        (self.has_features, self.quanta_per_step) = (sheet.has_features, sheet.ground.quanta_per_step);
         for i in 0..n {
             for j in i + 1..n {
                 let sums = if j == i + 1 && i < spokes.len() {
@@ -147,7 +149,11 @@ impl Hole {
     fn is_sound(&self, i: usize, k: usize, j: usize) -> bool {
         let corners = [i, k, j];
         let [a, b, c] = corners.map(|i| self.at[i]);
-        Shape::Sound.admits(a, b, c) || (self.has_features && is_eased([a, b, c], corners.map(|i| self.is_given[i])))
+        let is_eased = || {
+            let (heights, is_given) = (corners.map(|i| self.height[i]), corners.map(|i| self.is_given[i]));
+            is_eased([a, b, c], heights, is_given, self.quanta_per_step)
+        };
+        Shape::Sound.admits(a, b, c) || (self.has_features && is_eased())
     }
 
     #[inline(always)]

@@ -140,7 +140,7 @@ impl Insertion {
             }
         }
         self.flip_around(sheet, inserted);
-        let valid = |face: &Face| is_sound(sheet, inserted.at, [face.from, face.to]);
+        let valid = |face: &Face| is_sound(sheet, inserted, [face.from, face.to]);
         if !self.faces.iter().all(valid) {
             return None;
         }
@@ -188,11 +188,8 @@ impl Insertion {
             return None;
         }
         let apex = sheet.apex(face.twin);
-        let (a, d, b) = (sheet.at(face.from), sheet.at(apex), sheet.at(face.to));
-        let is_eased = |a: u32, b: u32| sheet.is_eased_at(inserted.at, [a, b]);
-        if !(Shape::Sound.admits(inserted.at, a, d) || is_eased(face.from, apex))
-            || !(Shape::Sound.admits(inserted.at, d, b) || is_eased(apex, face.to))
-        {
+        let d = sheet.at(apex);
+        if !is_sound(sheet, inserted, [face.from, apex]) || !is_sound(sheet, inserted, [apex, face.to]) {
             return None;
         }
         let old = face.squares + sheet.triangles[beyond as usize].squares;
@@ -234,8 +231,8 @@ fn middle_site(sheet: &TileMesh, triangle: u32, k: usize) -> Option<Site> {
     (hold == Hold::FREE && !sheet.ground.is_forbidden(at)).then_some(Site { on_edge: Some(edge), at, hold })
 }
 
-fn is_sound(sheet: &TileMesh, at: Place, [a, b]: [u32; 2]) -> bool {
-    Shape::Sound.admits(at, sheet.at(a), sheet.at(b)) || sheet.is_eased_at(at, [a, b])
+fn is_sound(sheet: &TileMesh, Inserted { at, height, .. }: Inserted, [a, b]: [u32; 2]) -> bool {
+    Shape::Sound.admits(at, sheet.at(a), sheet.at(b)) || sheet.is_eased_at((at, height), [a, b])
 }
 
 impl Face {

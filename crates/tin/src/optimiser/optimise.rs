@@ -85,6 +85,9 @@ fn work_on(dem: &Dem, importance: &Importance, start: &Tin, task: &Task, steps: 
     forbidden.extend(task.features.barred_posts(dem.rect()));
     forbidden.sort_unstable();
     ground.forbid(forbidden);
+    if let Some(spacing) = task.spacing {
+        ground.quanta_per_step = f64::from(spacing.quanta_per_post()) / f64::from(PER_POST);
+    }
     let mut held: Vec<Place> = task.held.iter().map(|&at| Place::of(at, dem.rect(), LATTICE_PER_POST)).collect();
     held.sort_unstable();
     // What lies on a side that is not open is another tile's, or a fixed outer border of the area.

@@ -1,7 +1,7 @@
 //! Where a vertex stands while it is being moved, and the Morton curve along which what is near in the plane becomes
 //! near in memory.
 
-use terrain::{FEATURE_STEPS_MAX, LatticePoint, PostRect};
+use terrain::{FEATURE_STEPS_MAX, LatticePoint, PostRect, QUANTA_PER_METRE};
 
 /// Steps of the working lattice between posts: fine enough that rounding costs nothing (measured), and so coarse that
 /// every orientation is exact.
@@ -70,16 +70,35 @@ const LEAST_ALTITUDE_SQUARED: f64 = (PER_POST / 4 * (PER_POST / 4)) as f64;
 
 /// Whether a triangle that is not sound is as good as its given corners permit: these may stand closer together than a
 /// sound triangle is high, and slopes between them are wanted. Of two such corners the third stands off by a quarter of
-/// a post; three have a triangle, whatever its shape.
-pub(crate) fn is_eased(at: [Place; 3], is_given: [bool; 3]) -> bool {
+/// a post; three have a triangle, whatever its shape. None may stand like a wall.
+pub(crate) fn is_eased(at: [Place; 3], heights: [f64; 3], is_given: [bool; 3], quanta_per_step: f64) -> bool {
     let area = Place::orient(at[0], at[1], at[2]);
-    match is_given {
+    let stands = match is_given {
         [true, true, true] => 0 < area,
         [true, true, false] => stands_off(area, at[0], at[1]),
         [false, true, true] => stands_off(area, at[1], at[2]),
         [true, false, true] => stands_off(area, at[2], at[0]),
         _ => false,
-    }
+    };
+    stands && !is_wall(at, heights, quanta_per_step)
+}
+
+/// Whether a corner of a triangle is farther above or below its longest side than aside of it, and by more than half a
+/// metre: beside a road no ground looks like that where another triangle may lie.
+fn is_wall(at: [Place; 3], heights: [f64; 3], quanta_per_step: f64) -> bool {
+    const LEAST: f64 = 0.5 * QUANTA_PER_METRE as f64;
+    let long = |k: usize| at[k].squared_distance(at[(k + 1) % 3]);
+    let [a, b, c] = match (0..3).max_by_key(|&k| long(k)) {
+        Some(1) => [1, 2, 0],
+        Some(2) => [2, 0, 1],
+        _ => [0, 1, 2],
+    };
+    let [east, north] = [at[b].x - at[a].x, at[b].y - at[a].y].map(f64::from);
+    let squared = long(a) as f64;
+    let share = (f64::from(at[c].x - at[a].x) * east + f64::from(at[c].y - at[a].y) * north) / squared;
+    let off = (heights[c] - heights[a] - share * (heights[b] - heights[a])).abs();
+    let aside = Place::orient(at[0], at[1], at[2]).abs() as f64 / squared.sqrt() * quanta_per_step;
+    LEAST < off && aside < off
 }
 
 fn stands_off(area: i64, a: Place, b: Place) -> bool {
@@ -158,6 +177,20 @@ fn spread(number: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn given_corners_permit_a_low_triangle_but_no_wall() {
+        let places = [Place::new(0, 0), Place::new(8 * PER_POST, 0), Place::new(4 * PER_POST, PER_POST / 64)];
+        let quanta_per_step = 4000.0 / f64::from(PER_POST);
+        let eased = |height: f64, given| is_eased(places, [0.0, 0.0, height], given, quanta_per_step);
+        // It lies 62.5 quanta aside of the longest side, and 64 are half a metre.
+        assert_eq!(
+            [0.0, 60.0, 65.0, -500.0, 500.0].map(|height| eased(height, [true; 3])),
+            [true, true, false, false, false]
+        );
+        assert!(!eased(0.0, [true, true, false]), "one that is not given stands off");
+        assert!(is_eased(places, [0.0, 0.0, 500.0], [true; 3], f64::INFINITY), "where no spacing is known");
+    }
 
     #[test]
     fn a_needle_has_an_angle_below_five_degrees() {

@@ -75,6 +75,7 @@ pub(crate) fn free(triangles: usize, effort: Effort) -> Task {
     Task {
         held: Vec::new(),
         features: Features::default(),
+        spacing: None,
         open: SeamSides::OPEN,
         line_step: None,
         budget: Budget::Triangles(triangles),

@@ -136,7 +136,7 @@ impl Mover {
         let mut has_rims = false;
         for index in 0..self.candidates.len() {
             let at = self.candidates[index];
-            if sheet.ground.is_forbidden(at) || !self.leaves(sheet, at, Shape::Sound) {
+            if sheet.ground.is_forbidden(at) || !self.leaves(sheet, (at, record.height), Shape::Sound) {
                 continue;
             }
             if !has_rims {
@@ -173,7 +173,7 @@ impl Mover {
         }
         sheet.star(vertex, &mut self.star);
         self.look_around(sheet);
-        if !self.leaves(sheet, at, Shape::Large) {
+        if !self.leaves(sheet, (at, record.height), Shape::Large) {
             return false;
         }
         self.sum_rims(sheet);
@@ -210,7 +210,7 @@ impl Mover {
         let mut last = None;
         while let Some(at) = self.most_promising() {
             // On a line several places are one.
-            if last.replace(at) == Some(at) || !self.leaves(sheet, at, shape) {
+            if last.replace(at) == Some(at) || !self.leaves(sheet, (at, record.height), shape) {
                 continue;
             }
             let most = best.map_or(f64::INFINITY, |best: Stand| best.squares);
@@ -281,13 +281,13 @@ impl Mover {
         if i + 1 == self.around.len() { 0 } else { i + 1 }
     }
 
-    /// Whether a vertex at a place leaves every triangle around it such a shape.
+    /// Whether a vertex at a place, with a height in quanta, leaves every triangle around it such a shape.
     #[inline(always)]
-    fn leaves(&self, sheet: &TileMesh, at: Place, shape: Shape) -> bool {
+    fn leaves(&self, sheet: &TileMesh, (at, height): (Place, f64), shape: Shape) -> bool {
         (0..self.star.edges.len()).all(|i| {
             let [a, b] = self.opposite(i);
-            shape.admits(at, a.0, b.0)
-                || (shape == Shape::Sound && sheet.is_eased_at(at, [self.star.ring[i], self.star.ring[self.after(i)]]))
+            let ring = || [self.star.ring[i], self.star.ring[self.after(i)]];
+            shape.admits(at, a.0, b.0) || (shape == Shape::Sound && sheet.is_eased_at((at, height), ring()))
         })
     }
 

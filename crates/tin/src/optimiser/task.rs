@@ -1,7 +1,7 @@
 //! What the optimiser is asked to do.
 
 use terrain::limits::TileLedger;
-use terrain::{Effort, Features, HeightFit, Importance, Lattice, LatticePoint, Post, SeamSides};
+use terrain::{Effort, Features, HeightFit, Importance, Lattice, LatticePoint, Post, SeamSides, Spacing};
 
 /// What the finished mesh may have.
 #[derive(Clone, Debug)]
@@ -24,6 +24,8 @@ pub struct Task {
     /// Vertices and edges that the TIN has to keep, those of the tile only. What the budget permits comes on top of
     /// them where it is one of limits, and counts them where it is a number.
     pub features: Features,
+    /// How far posts are apart, where that is known: beside features no triangle may come that stands like a wall.
+    pub spacing: Option<Spacing>,
     /// Sides on which vertices may be chosen; those on the others are held, too.
     pub open: SeamSides,
     /// Posts between lines that edges may not cross; `None` where only the tile's border is one.

@@ -259,12 +259,16 @@ impl<'a> TileMesh<'a> {
 
     /// Whether a triangle that is not sound is as good as its given corners permit.
     pub fn is_eased(&self, corners: [u32; 3]) -> bool {
-        self.has_features && is_eased(self.places(corners), corners.map(|corner| self.is_given(corner)))
+        let is_given = || corners.map(|corner| self.is_given(corner));
+        let (at, heights) = (self.places(corners), self.heights(corners));
+        self.has_features && is_eased(at, heights, is_given(), self.ground.quanta_per_step)
     }
 
-    /// The same of a triangle between a place and two vertices.
-    pub fn is_eased_at(&self, at: Place, [a, b]: [u32; 2]) -> bool {
-        self.has_features && is_eased([at, self.at(a), self.at(b)], [false, self.is_given(a), self.is_given(b)])
+    /// The same of a triangle between a place, with a height in quanta, and two vertices.
+    pub fn is_eased_at(&self, (at, height): (Place, f64), [a, b]: [u32; 2]) -> bool {
+        let [a, b] = [a, b].map(|vertex| &self.vertices[vertex as usize]);
+        let (at, is_given) = ([at, a.at, b.at], [false, a.hold.is_fixed(), b.hold.is_fixed()]);
+        self.has_features && is_eased(at, [height, a.height, b.height], is_given, self.ground.quanta_per_step)
     }
 
     pub fn is_given(&self, vertex: u32) -> bool {

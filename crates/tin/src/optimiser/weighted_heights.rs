@@ -24,6 +24,8 @@ pub(crate) struct WeightedHeights<'a> {
     level: Level,
     /// Posts that no vertex may come nearest to, in ascending order.
     forbidden: Vec<Post>,
+    /// Quanta between steps of places, infinite where that is not known.
+    pub quanta_per_step: f64,
 }
 
 impl<'a> WeightedHeights<'a> {
@@ -50,6 +52,7 @@ impl<'a> WeightedHeights<'a> {
             far,
             level: widest_level(),
             forbidden: Vec::new(),
+            quanta_per_step: f64::INFINITY,
         }
     }
 

@@ -99,8 +99,8 @@ pub(super) fn limits(report: &Report, marks: &Marks) -> Markup {
                 (figures([grouped(report.pool.used), grouped(report.pool.size), String::new(), String::new()]))
             }
         }))
-        p.quiet { "The fullest 9 x 9 load modules, which bound a 4 km square at any offset, hold "
-            (grouped(windows.worst_9x9)) " " (report.count) "." }
+        p.quiet { "A 4 km square at any offset holds " (grouped(windows.worst_9x9)) " " (report.count) " at most, "
+            "as many as the fullest square of load modules that is one of them wider." }
         (bound(report, marks))
     }
 }
