@@ -227,7 +227,7 @@ fn in_culverts(middle: Middle, points: &[(Place, i32)]) -> Vec<Middle> {
 }
 
 /// Places at which the middle of what is kept ends although its way goes on, with its class and its feature. `family`
-/// says of classes what hangs together. Ways that thinning made the same line are one here, as they are in load modules.
+/// says of classes what hangs together. Ways that thinning made the same line are one, as they are in load modules.
 pub(crate) fn loose_ends(middles: &[Middle], family: &BTreeMap<u16, u8>, site: &Site) -> Vec<(Place, u16, FeatureId)> {
     #[derive(Default)]
     struct Meeting {
