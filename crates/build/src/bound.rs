@@ -180,7 +180,8 @@ fn without_limit(
     let stop = Stop { points: Some(points + extra), ..Stop::default() };
     let task = TileTask { inherited, stop, ..TileTask::plain(tile, rect, rule(run.job, &run.area)) };
     let features = TileFeatures { kept: features, ..TileFeatures::none(tile) };
-    let refinement = Refinement { task, optimising, most: Most::AsTask, features, spacing: None };
+    let spacing = Some(run.area.frame.spacing);
+    let refinement = Refinement { task, optimising, most: Most::AsTask, features, spacing };
     let tin = match optimising {
         Some(optimising) => refinement.fill(&window, optimising, part),
         None => refinement.run(&window, None, &sides).tin,

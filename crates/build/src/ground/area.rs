@@ -215,3 +215,25 @@ pub fn stretched(epsg: u32, area: &GamingArea) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn an_area_is_told_of_where_its_metres_are_not_those_of_the_ground() {
+        let told = |epsg: u32, [east, north]: [i32; 2]| {
+            let text = format!(
+                "[area]\nname = \"a\"\ncrs = \"EPSG:{epsg}\"\norigin_m = [{east}, {north}]\nsize_m = [1000, 1000]\n\
+                 spacing_m = 25\n[dem]\nsource = \"sample\"\n"
+            );
+            let area = GamingArea::new(&Job::from_text(&text, Path::new("a.toml")).unwrap()).unwrap();
+            stretched(epsg, &area)
+        };
+        assert_eq!(told(32611, [500_000, 3_900_000]), None);
+        assert_eq!(told(3857, [1_000_000, 0]), None, "on the equator");
+        let found = told(3857, [1_000_000, 6_446_000]).unwrap();
+        assert!(found.starts_with("area.crs: 100 m of EPSG:3857 are 64."), "{found}");
+    }
+}

@@ -362,6 +362,28 @@ mod tests {
     }
 
     #[test]
+    fn a_vertex_beside_a_wall_lies_off_it_no_farther_than_rounding_moves_it() {
+        let vertex = |y, x, z| ModuleVertex { y, x, z };
+        // Level ground to the west, and 100 m above it to the east.
+        let vertices = [0, 12_800].map(|z| [vertex(0, 1000, z), vertex(6400, 1000, z)]);
+        let (low, high) = (vertex(0, 0, 0), vertex(0, 6400, 12_800));
+        let module = LoadModule {
+            id: ModuleId { row: 0, col: 0 },
+            side: 6400,
+            vertices: vec![low, vertices[0][0], vertices[0][1], vertices[1][0], high, vertices[1][1]],
+            triangles: vec![[0, 1, 2], [3, 4, 5]],
+            classes: vec![0; 2],
+            polygon_count: 2,
+            residual: ModuleResidual::default(),
+            decks: Decks::default(),
+            lines: Vec::new(),
+            objects: Objects::default(),
+        };
+        let ground = Ground::of(&module, 1, 8.0);
+        assert_eq!([(500, 996), (500, 990), (500, 1004)].map(|at| ground.off_m(at, 12_800)), [0.0, 100.0, 0.0]);
+    }
+
+    #[test]
     fn a_deck_stands_for_ground_only_where_it_is_as_high_as_the_line() {
         let vertex = |y, x, z| ModuleVertex { y, x, z };
         let corners = |z| vec![vertex(0, 0, z), vertex(0, 6400, z), vertex(6400, 6400, z)];

@@ -25,6 +25,7 @@ pub(crate) struct Hole {
     /// Whether a corner is given; not asked where there are no features.
     is_given: [bool; CORNERS_MAX],
     has_features: bool,
+    /// Quanta between steps of places, as the ground has them.
     quanta_per_step: f64,
     /// Sums west of the chord from corner i to corner j, for i < j: `forth[i][..][j]` and `back[j][..][i]`.
     forth: [[[f64; WIDE]; SUMS]; CORNERS_MAX],
