@@ -30,6 +30,7 @@
 //!     effort: Effort::Normal,
 //!     height_fit: HeightFit::Squares,
 //!     lattice: Lattice::Eighth,
+//!     spacing: None,
 //!     rms_quanta: None,
 //!     largest_quanta: None,
 //! };
