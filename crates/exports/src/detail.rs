@@ -1,8 +1,11 @@
 //! Levels of detail inside files: the one list of a product's levels from fine to coarse, how far each lies from the
 //! ground, and from how far away it will do.
 
-use terrain::{ModuleRect, QUANTA_PER_METRE};
+use std::collections::BTreeSet;
 
+use terrain::{HOLE_CLASS, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+
+use crate::triangle_index::TriangleIndex;
 use crate::{Mesh, Product};
 
 /// Metres of distance at which a metre of error will do: it is a milliradian there, about a pixel of a picture that is
@@ -23,7 +26,8 @@ pub(crate) struct Detail {
 pub(crate) struct Step {
     /// Level of detail, 0 being the finest.
     pub level: usize,
-    /// How far it lies from the ground at most, in metres. What is coarser is never said to be truer.
+    /// How far it lies at most from the heights it was built from, at their posts, or, of what is coarser, from the
+    /// finest level, in metres. What is coarser is never said to be truer.
     pub error_m: f64,
     /// From what distance of its middle on it will do, in metres; 0 for the finest.
     pub near_m: f64,
@@ -46,8 +50,12 @@ impl Detail {
 /// The levels of a rectangle of load modules.
 pub(crate) fn steps<'a>(levels: impl IntoIterator<Item = &'a Product>, rect: ModuleRect) -> Vec<Step> {
     let mut error_m: f64 = 0.0;
-    let step = |(index, product): (usize, &Product)| {
-        error_m = error_m.max(largest_residual_m(product, rect));
+    let mut finest: Option<&Product> = None;
+    let step = |(index, product): (usize, &'a Product)| {
+        // Between posts a road or a bank may lie where no residual tells of it.
+        let from_finest_m = finest.map_or(0.0, |finest| largest_distance_m(finest, product, rect));
+        finest = finest.or(Some(product));
+        error_m = error_m.max(largest_residual_m(product, rect)).max(from_finest_m);
         // Of no place of the unit is the eye nearer than that.
         let radius_m = product.side_m() * f64::from(rect.rows()).hypot(f64::from(rect.cols())) / 2.0;
         let near_m = if index == 0 { 0.0 } else { radius_m + DISTANCE_PER_ERROR * error_m };
@@ -60,6 +68,26 @@ pub(crate) fn steps<'a>(levels: impl IntoIterator<Item = &'a Product>, rect: Mod
 pub(crate) fn largest_residual_m(product: &Product, rect: ModuleRect) -> f64 {
     let residuals = rect.iter().filter_map(|id| product.module(id)).map(|module| module.residual.largest);
     f64::from(residuals.max().unwrap_or(0)) / f64::from(QUANTA_PER_METRE)
+}
+
+/// The largest distance, straight up or down, between the ground of two products of the same load modules in a
+/// rectangle, at the vertices of either, in metres; over holes there is no ground.
+fn largest_distance_m(one: &Product, other: &Product, rect: ModuleRect) -> f64 {
+    let mut largest_m: f64 = 0.0;
+    for (from, to) in [(one, other), (other, one)] {
+        let mut index = TriangleIndex::new(to);
+        for (module, there) in rect.iter().filter_map(|id| from.module(id).zip(to.module(id))) {
+            let grounds = module.triangles.iter().zip(&module.classes).filter(|(_, class)| **class != HOLE_CLASS);
+            let corners: BTreeSet<u16> = grounds.flat_map(|(triangle, _)| *triangle).collect();
+            for vertex in corners.into_iter().map(|corner| module.vertices[usize::from(corner)]) {
+                let ground = index.in_module(there, [f64::from(vertex.x), f64::from(vertex.y)]);
+                if let Some(ground) = ground.filter(|ground| ground.class != HOLE_CLASS) {
+                    largest_m = largest_m.max((ground.height_m - metres_of_quanta(vertex.z)).abs());
+                }
+            }
+        }
+    }
+    largest_m
 }
 
 /// The share of a picture that a square of `side_m` fills at most, seen from `away_m`.
@@ -81,6 +109,12 @@ mod tests {
         let error_m = 1200.0 / 128.0;
         let expected = [(0, 300.0 / 128.0, 0.0), (1, error_m, radius_m + 1000.0 * error_m)];
         assert_eq!(found.iter().map(|step| (step.level, step.error_m, step.near_m)).collect::<Vec<_>>(), expected);
+        // The pit that the coarser level lacks counts even where no post fell into it.
+        let mut levels = levels;
+        levels[1].modules.iter_mut().for_each(|module| module.residual.largest = 0);
+        let pit_m = (128_256.0 - 256.0 * 0.5 - 128.0 * 0.4 - 127_000.0) / 128.0;
+        assert!((steps(&levels, product.rect)[1].error_m - pit_m).abs() < 1e-9);
+        levels[1].modules[1].residual.largest = 1200;
         let mut upside_down = levels;
         upside_down.reverse();
         let found = steps(&upside_down, product.rect);

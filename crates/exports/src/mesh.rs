@@ -69,8 +69,7 @@ impl Part {
     pub(crate) fn by_thing(&self) -> Vec<(Thing, Self)> {
         let mut pieces: BTreeMap<(ObjectKind, u64), Pieces> = BTreeMap::new();
         for (thing, range) in &self.things {
-            let (whole, ranges) = pieces.entry((thing.kind, thing.id)).or_insert_with(|| (*thing, Vec::new()));
-            whole.height = whole.height.max(thing.height);
+            let (_, ranges) = pieces.entry((thing.kind, thing.id)).or_insert_with(|| (*thing, Vec::new()));
             ranges.push(range.clone());
         }
         let part = |ranges: Vec<Range<usize>>| {
@@ -193,6 +192,13 @@ impl Mesh {
             }
         }
         self.begin_module(Sheet::Objects);
+        // Pieces of one object in several load modules are told the same of: the height of the highest.
+        let mut highest: BTreeMap<(ObjectKind, u64), i32> = BTreeMap::new();
+        for (thing, _) in &self.things {
+            let height = highest.entry((thing.kind, thing.id)).or_insert(thing.height);
+            *height = thing.height.max(*height);
+        }
+        self.things.iter_mut().for_each(|(thing, _)| thing.height = highest[&(thing.kind, thing.id)]);
         self
     }
 

@@ -148,8 +148,12 @@ impl Product {
         };
         if 0 < product.hole_triangles() {
             let count = product.object_count();
-            product.modules.iter_mut().chain(product.coarser.iter_mut().flatten()).for_each(leave_out_over_holes);
+            product.modules.iter_mut().for_each(leave_out_over_holes);
             product.over_holes = count - product.object_count();
+            // All levels have the same objects, wherever the holes of each end.
+            for (finest, coarser) in product.coarser.iter_mut().flat_map(|level| product.modules.iter().zip(level)) {
+                coarser.objects = finest.objects.clone();
+            }
         }
         Ok(product)
     }

@@ -41,6 +41,11 @@ impl<'a> TriangleIndex<'a> {
             return None;
         }
         let (module, place) = module_at(product, place_m)?;
+        self.in_module(module, place)
+    }
+
+    /// The ground at a place of a load module of the product, east and north of its corner in quanta.
+    pub(crate) fn in_module(&mut self, module: &LoadModule, place: [f64; 2]) -> Option<Ground> {
         let cells = self.cells.entry(module.id).or_insert_with(|| Cells::of(module));
         triangle_at(module, cells.candidates(place), place)
     }
