@@ -1,8 +1,8 @@
 //! How far decks stand above the ground, from triangles alone.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use terrain::{LoadModule, ModuleVertex};
+use terrain::{LineStorey, LoadModule, ModuleLine, ModuleVertex};
 
 use crate::places::{each_under, height_in};
 
@@ -21,7 +21,9 @@ pub struct DeckFigures {
     pub under: u64,
     /// How far it does at most, in quanta.
     pub deepest: u32,
-    /// The least height of a deck above the ground of each class, in quanta.
+    /// The least height of a deck above what it crosses, by the class of that, in quanta: above ways and rivers where
+    /// middle lines cross, above level ground of a class that has no middle line, such as lakes, anywhere. Beside its
+    /// ends, where the ground rises to it, a deck crosses nothing.
     pub clearance: BTreeMap<u8, i32>,
 }
 
@@ -31,12 +33,22 @@ impl DeckFigures {
         let places = samples(module);
         let mut figures = Self { samples: places.len() as u64, ..Self::default() };
         let mut above = vec![f64::INFINITY; places.len()];
+        let of_lines: BTreeSet<u8> = module.lines.iter().map(|line| line.class).collect();
+        let is_level = |triangle: usize| {
+            let [a, b, c] = module.triangles[triangle].map(|corner| module.vertices[usize::from(corner)].z);
+            a == b && b == c
+        };
         each_under(module, f64::from(module.side), &places, &mut |index, triangle, plane| {
             let height = places[index][2] - plane;
             above[index] = above[index].min(height);
-            let least = figures.clearance.entry(module.classes[triangle]).or_insert(i32::MAX);
-            *least = (*least).min(height.floor() as i32);
+            let class = module.classes[triangle];
+            if is_level(triangle) && !of_lines.contains(&class) {
+                figures.add_clearance(class, height.floor() as i32);
+            }
         });
+        for (class, height) in crossed(&module.lines) {
+            figures.add_clearance(class, height);
+        }
         for under in above.into_iter().map(|above| -above.floor() as i32).filter(|under| ROUNDING < *under) {
             figures.under += 1;
             figures.deepest = figures.deepest.max(under.unsigned_abs());
@@ -49,10 +61,57 @@ impl DeckFigures {
         self.samples += other.samples;
         self.under += other.under;
         self.deepest = self.deepest.max(other.deepest);
-        for (&class, &least) in &other.clearance {
-            let own = self.clearance.entry(class).or_insert(least);
-            *own = least.min(*own);
-        }
+        other.clearance.iter().for_each(|(&class, &least)| self.add_clearance(class, least));
+    }
+
+    fn add_clearance(&mut self, class: u8, height: i32) {
+        let least = self.clearance.entry(class).or_insert(height);
+        *least = height.min(*least);
+    }
+}
+
+/// Class of each line in the ground that the line of a bridge crosses, and how high the bridge passes over it, in
+/// quanta: lines that meet at an end, as those of a bridge and of the way that goes on from it, do not cross.
+fn crossed(lines: &[ModuleLine]) -> Vec<(u8, i32)> {
+    let is_bridge = |line: &&ModuleLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
+    let bridges: Vec<Segment> = lines.iter().filter(is_bridge).flat_map(segments).collect();
+    let below = lines.iter().filter(|line| line.traits.storey == LineStorey::Ground && line.traits.is_in_ground);
+    let crossings = |line: &ModuleLine| -> Vec<(u8, i32)> {
+        let pairs = segments(line).into_iter().flat_map(|under| bridges.iter().map(move |over| (over, under)));
+        pairs.filter_map(|(over, under)| Some((line.class, over.height_over(under)?.floor() as i32))).collect()
+    };
+    below.flat_map(crossings).collect()
+}
+
+/// Two neighbouring vertices of a line, and which of them are its ends.
+#[derive(Clone, Copy)]
+struct Segment {
+    places: [[f64; 3]; 2],
+    is_end: [bool; 2],
+}
+
+fn segments(line: &ModuleLine) -> Vec<Segment> {
+    let place = |v: &ModuleVertex| [f64::from(v.x), f64::from(v.y), f64::from(v.z)];
+    let last = line.vertices.len().saturating_sub(2);
+    let segment = |(at, pair): (usize, &[ModuleVertex])| Segment {
+        places: [place(&pair[0]), place(&pair[1])],
+        is_end: [at == 0, at == last],
+    };
+    line.vertices.windows(2).enumerate().map(segment).collect()
+}
+
+impl Segment {
+    /// How high it passes over another that it crosses, other than at an end of both lines.
+    fn height_over(&self, under: Self) -> Option<f64> {
+        let ([a, b], [c, d]) = (self.places, under.places);
+        let cross = |u: [f64; 2], v: [f64; 2]| u[0] * v[1] - u[1] * v[0];
+        let to = |from: [f64; 3], to: [f64; 3]| [to[0] - from[0], to[1] - from[1]];
+        let turn = cross(to(a, b), to(c, d));
+        let [along, share] = [cross(to(a, c), to(c, d)) / turn, cross(to(a, c), to(a, b)) / turn];
+        let ends = |of: &Self, at: f64| (at == 0.0 && of.is_end[0]) || (at == 1.0 && of.is_end[1]);
+        let crosses = (0.0..=1.0).contains(&along) && (0.0..=1.0).contains(&share);
+        let is_crossing = crosses && !(ends(self, along) && ends(&under, share));
+        is_crossing.then(|| a[2] + along * (b[2] - a[2]) - c[2] - share * (d[2] - c[2]))
     }
 }
 
@@ -81,7 +140,7 @@ fn samples(module: &LoadModule) -> Vec<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Decks, ModuleId, ModuleResidual};
+    use terrain::{Decks, LineForm, LineKind, LineTraits, ModuleId, ModuleResidual};
 
     fn vertex(x: u16, y: u16, z: i32) -> ModuleVertex {
         ModuleVertex { y, x, z }
@@ -115,11 +174,45 @@ mod tests {
     }
 
     #[test]
-    fn a_deck_above_the_ground_has_its_least_height_over_each_class_and_no_place_under_it() {
-        let found = DeckFigures::of(&module([256, 256, 768, 768]));
+    fn a_deck_has_its_least_height_over_level_ground_of_a_class_without_lines_and_no_place_under_it() {
+        let mut module = module([256, 256, 768, 768]);
+        let found = DeckFigures::of(&module);
         assert_eq!((found.samples, found.under, found.deepest), (200, 0, 0));
         let [south, north] = [found.clearance[&0], found.clearance[&1]];
         assert!((256..300).contains(&south) && (500..600).contains(&north), "{south} {north}");
+        // The south slopes: nothing of it is level.
+        module.vertices[0].z = -16;
+        module.vertices[1].z = -16;
+        assert_eq!(DeckFigures::of(&module).clearance.into_keys().collect::<Vec<_>>(), [1]);
+    }
+
+    #[test]
+    fn a_bridge_passes_over_the_line_it_crosses_and_not_over_those_it_ends_at() {
+        let line = |class, storey, places: &[(u16, u16, i32)]| ModuleLine {
+            class,
+            traits: LineTraits {
+                kind: LineKind::Travelled,
+                form: LineForm::Line,
+                storey,
+                is_kept: true,
+                is_in_ground: storey == LineStorey::Ground,
+                width: 640,
+            },
+            vertices: places.iter().map(|&(x, y, z)| vertex(x, y, z)).collect(),
+        };
+        let mut module = module([256, 256, 768, 768]);
+        let bridge = [(4640, 5000, 256), (4640, 7560, 768)];
+        module.lines = vec![
+            line(3, LineStorey::Bridge, &bridge),
+            // The road that goes on from the bridge, and one that joins it there.
+            line(3, LineStorey::Ground, &[(4640, 3000, 128), bridge[0]]),
+            line(0, LineStorey::Ground, &[(3000, 5000, 200), bridge[0]]),
+            // A stream halfway below, whose vertex lies in the middle, and a tunnel.
+            line(1, LineStorey::Ground, &[(4000, 6280, 0), (4640, 6280, 12), (5280, 6280, 0)]),
+            line(2, LineStorey::Tunnel, &[(4000, 6300, 0), (5280, 6300, 0)]),
+        ];
+        module.lines[4].traits.is_kept = false;
+        assert_eq!(DeckFigures::of(&module).clearance, [(1, 500)].into());
     }
 
     #[test]

@@ -150,7 +150,7 @@ fn check_sums(
     verdict.problems.extend(features.problems);
     verdict.unchecked.extend(features.unchecked);
     verdict.network = features.network;
-    verdict.decks = deck::told(&walked.sums, &job.class_names());
+    verdict.decks = deck::told(&walked.sums, job);
     if let Some(spec) = &job.objects {
         let (_, _, outlines) = folder.read_outlines()?;
         let of_report = report.as_ref().and_then(|report| report.objects.as_ref());

@@ -46,6 +46,14 @@ impl Job {
             None => self.importance.classes.clone(),
         }
     }
+
+    /// Whether roads, rivers or lakes may have a class, by its index in [`Self::class_names`].
+    pub fn is_of_features(&self, class: u8) -> bool {
+        let is_of_lakes = self.dem.water.as_ref().is_some_and(|water| water.class == class);
+        let name = self.class_names().into_iter().nth(class.into());
+        let is_of = |features: &FeaturesSpec| name.is_some_and(|name| features.classes().contains(&name));
+        is_of_lakes || self.features.as_ref().is_some_and(is_of)
+    }
 }
 
 /// The gaming area and its working grid.

@@ -4,9 +4,10 @@
 
 const SCHEMES: [&str; 3] = ["https://", "http://", "s3://"];
 
-/// Whether a name in a job is an address on another machine.
+/// Whether a name in a job is an address on another machine, of a scheme that is followed or not.
 pub fn is_remote(written: &str) -> bool {
-    SCHEMES.iter().any(|scheme| written.starts_with(scheme))
+    let scheme = written.split_once("://").map_or("", |(scheme, _)| scheme);
+    !scheme.is_empty() && scheme.bytes().all(|byte| byte.is_ascii_alphanumeric())
 }
 
 /// An address without what follows its `?`, which may be a signature.

@@ -72,7 +72,7 @@ pub struct MeasuredFeatures {
     pub outside: MeasuredTally,
     /// Places of decks that were looked at, those with ground above them, and how far it is at most, in quanta.
     pub decks: (u64, u64, u32),
-    /// The least height of decks above each class of ground, in quanta.
+    /// The least height of decks above what they cross of each class, in quanta.
     pub deck_clearance: Vec<(u8, i32)>,
 }
 

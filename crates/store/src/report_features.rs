@@ -13,7 +13,7 @@ pub struct ReportFeatures {
     pub remarks: ReportFeatureRemarks,
     /// What must hold of features, in figures.
     pub checks: ReportFeatureChecks,
-    /// How low decks pass over the ground of each class.
+    /// How low decks pass over ways and water of each class.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub deck_clearances: Vec<ReportDeckClearance>,
     /// What they move.
@@ -175,11 +175,12 @@ pub struct ReportFeatureChecks {
     pub deck_under_max_m: f64,
 }
 
-/// How low decks pass over one class of ground.
+/// How low decks pass over one class of ways or water.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReportDeckClearance {
     /// Name of the class.
     pub class: String,
-    /// The least height of a deck above it, in metres.
+    /// The least height of a deck above what it crosses of the class, in metres: where middle lines cross, or anywhere
+    /// over level water.
     pub least_m: f64,
 }

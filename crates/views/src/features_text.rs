@@ -148,7 +148,7 @@ fn under_ground(checks: &ReportFeatureChecks) -> String {
     if checks.deck_samples_under == 0 { of } else { of + &deepest }
 }
 
-/// How low decks pass over each class of ground, in words; nothing without decks.
+/// How low decks pass over each class of ways or water, in words; nothing without decks.
 pub(crate) fn clearances_in_words(features: &ReportFeatures) -> Option<String> {
     let least = features.deck_clearances.iter().map(|over| format!("{} {:.2} m", over.class, over.least_m));
     let least: Vec<String> = least.collect();

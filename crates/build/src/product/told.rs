@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ground::GamingArea;
 use fidelity::FeatureFigures;
-use job::{HOLE_CLASS_NAME, Job};
+use job::Job;
 use store::{
     AreaLevel, FeatureLine, FeatureRemark, ReportDeckClearance, ReportFeatureChecks, ReportFeatureClass,
     ReportFeatureCost, ReportFeatureRemarks, ReportFeatures,
@@ -51,7 +51,7 @@ pub fn told(job: &Job, area: &GamingArea, level: &AreaLevel, figures: &FeatureFi
         all: cost(area, level, |_| true),
         remarks: counts(&remarks),
         checks: checks(level, figures, extent_m),
-        deck_clearances: deck_clearances(&names, figures),
+        deck_clearances: deck_clearances(job, &names, figures),
         earthworks: crate::product::earthworks::earthworks(&names, level),
     };
     Told { report, remarks }
@@ -76,11 +76,13 @@ pub fn read_told(opened: &Opened) -> Result<Option<(AreaLevel, Told)>, ProductEr
     Ok(Some((level, told)))
 }
 
-/// How low decks pass over the ground of each class.
-fn deck_clearances(names: &[String], figures: &FeatureFigures) -> Vec<ReportDeckClearance> {
-    let name = |class: u8| names.get(usize::from(class)).map_or(HOLE_CLASS_NAME, String::as_str).to_owned();
-    let least = figures.decks.clearance.iter();
-    least.map(|(&class, &least)| ReportDeckClearance { class: name(class), least_m: metres_of_quanta(least) }).collect()
+/// How low decks pass over ways and water of each class.
+fn deck_clearances(job: &Job, names: &[String], figures: &FeatureFigures) -> Vec<ReportDeckClearance> {
+    let told = |(&class, &least): (&u8, &i32)| {
+        let name = names.get(usize::from(class)).filter(|_| job.is_of_features(class))?;
+        Some(ReportDeckClearance { class: name.clone(), least_m: metres_of_quanta(least) })
+    };
+    figures.decks.clearance.iter().filter_map(told).collect()
 }
 
 /// Remarks, each counted once, by the worst that was done.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fidelity::DeckFigures;
+use job::Job;
 use terrain::{FeatureSurface, LatticePoint, ModuleVertex, QUANTA_PER_METRE};
 
 use super::square::{At, Square, is_on, turn};
@@ -16,9 +17,11 @@ const AREA_MIN: f64 = 0.5;
 
 const OF_NONE: &str = "a corner of decks is that of no bridge";
 
-/// What all decks come to, in words: square metres and the least height over each class at the finest level, and what
+/// What all decks come to, in words: square metres and the least height over each class of ways
+/// and water at the finest level, and what
 /// lies under the ground at the level that has most of it. That limits and the ground left some there is no damage.
-pub(crate) fn told(levels: &[LevelSums], classes: &[String]) -> Option<String> {
+pub(crate) fn told(levels: &[LevelSums], job: &Job) -> Option<String> {
+    let classes = job.class_names();
     let by_level: Vec<&DeckFigures> = levels.iter().map(|sums| &sums.decks).collect();
     let worst = by_level.iter().max_by_key(|figures| (figures.under, figures.deepest))?;
     let all = by_level[0];
@@ -28,12 +31,12 @@ pub(crate) fn told(levels: &[LevelSums], classes: &[String]) -> Option<String> {
         some => format!("{some} of them under the ground, by {:.2} m at most", metres(worst.deepest.into())),
     };
     let least = all.clearance.iter().filter_map(|(class, quanta)| {
-        // What rounding puts under the ground lies on it.
-        let above = if worst.under == 0 { (*quanta).max(0) } else { *quanta };
-        classes.get(usize::from(*class)).map(|name| format!("{:.2} m above {name}", metres(above.into())))
+        let name = classes.get(usize::from(*class)).filter(|_| job.is_of_features(*class))?;
+        Some(format!("{:.2} m above {name}", metres((*quanta).into())))
     });
     let least: Vec<String> = least.collect();
-    (0 < all.samples).then(|| format!("{} square metres, {under}; at least {}", all.samples, least.join(", ")))
+    let least = if least.is_empty() { String::new() } else { format!("; at least {}", least.join(", ")) };
+    (0 < all.samples).then(|| format!("{} square metres, {under}{least}", all.samples))
 }
 
 /// What is wrong with the decks of a load module: corners that are not there, corners of no deck, corners that are

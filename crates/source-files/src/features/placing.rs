@@ -35,6 +35,8 @@ pub(super) struct Placing {
     /// Whether points are placed.
     points: bool,
     remarks_beyond: u64,
+    /// Lines and polygons with a vertex that is not on the Earth.
+    off_the_earth: u64,
     /// Of the whole file, whose parts share it.
     allowance: Arc<Allowance>,
     file: FeatureFile,
@@ -61,6 +63,7 @@ impl Placing {
             height_unit_m,
             points: wanted.points,
             remarks_beyond: 0,
+            off_the_earth: 0,
             allowance: Arc::new(Allowance::new(path, file_bytes)),
             file,
         })
@@ -73,6 +76,7 @@ impl Placing {
             source: self.source.clone(),
             lies: Extent::NOTHING,
             remarks_beyond: 0,
+            off_the_earth: 0,
             allowance: self.allowance.clone(),
             file: FeatureFile::default(),
             ..*self
@@ -88,6 +92,7 @@ impl Placing {
     pub(super) fn append(&mut self, part: Self) {
         self.lies_over(&part.lies);
         self.remarks_beyond += part.remarks_beyond;
+        self.off_the_earth += part.off_the_earth;
         let FeatureFile { mut features, remarks, notes, found, outside, attribution: _, buildings: _ } = part.file;
         self.file.features.append(&mut features);
         self.file.notes.extend(notes);
@@ -185,6 +190,7 @@ impl Placing {
         if let Some(vertex) = shape.vertices().find(|vertex| !self.is_on_earth(vertex)) {
             let [east, north] = [vertex[0], vertex[1]].map(coordinate);
             let found = format!("a vertex at {east}, {north}, which is not on the Earth");
+            self.off_the_earth += 1;
             return self.remark(&id, None, found, LEFT_OUT);
         }
         let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
@@ -383,6 +389,11 @@ impl Placing {
         self.allowance.check()?;
         if 0 < self.remarks_beyond {
             self.file.notes.push(format!("{} more remarks about single features", self.remarks_beyond));
+        }
+        if 0 < self.off_the_earth {
+            let (count, found) = (self.off_the_earth, self.file.found);
+            let note = format!("{count} of its {found} lines and polygons reach beyond the Earth and are left out");
+            self.file.notes.push(note);
         }
         if self.file.found == 0 {
             self.file.notes.push("no line or polygon in the file".into());
