@@ -122,6 +122,9 @@ class Attack:
         found["deck"] += judge.sunken_decks(database)
         found["object"] += judge.standing(database, *self.scene.job.object_limits)
         found["river"] += judge.feature_lines(database) + judge.rising_lines(database)
+        # A pin may stand beside a road at any height.
+        if "pins" not in sections.get("tin", {}):
+            found["wall"] += judge.walls(database, self.scene.posts)
         for kind, faults in found.items():
             for fault in faults[:3]:
                 self.fault(kind, fault)

@@ -18,6 +18,7 @@ lakes        heights over all vertices of connected triangles of water
 decks        how far decks stand above the triangles under them, exactly, over their whole area
 feature_lines  lines of features.gpkg are edges of triangles, and channels fall
 rising_lines   the same of the lines in load modules
+walls          steps of the ground beside roads and railways
 standing       walls reach the ground, roofs stand over it, pieces of an object fit together, limits of objects hold
 """
 
@@ -675,6 +676,82 @@ def rising_lines(database):
     return faults
 
 
+def walls(database, posts=None, height_m=2.0, others_m=25.0):
+    """Faults of roads and railways built as strips: stretches beside which the ground stands like a wall, higher or
+    lower by more than `height_m` a metre outside of the strip's edge. Near other lines and near ends nothing is said:
+    what lies between two ways has to be as steep as they ask for. Nor is where posts, if they are given, stand steeper
+    than 1 : 2 nearby, or the strip lies more than 10 m off them."""
+    faults, placed = [], {}
+    steep = steep_posts(posts, database.spacing, reach=30 * QUANTA) if posts is not None else None
+    for (row, column), module in database.levels[0].items():
+        corner = (column * database.side, row * database.side)
+        placed[row, column] = [np.array([v[:2] for v in line["vertices"]], float) + corner for line in module.lines]
+    for (row, column), module in database.levels[0].items():
+        around = [placed.get((row + up, column + right), []) for up in (-1, 0, 1) for right in (-1, 0, 1)]
+        for line, vertices in zip(module.lines, placed[row, column]):
+            if line["form"] != "strip" or line["storey"] != "ground" or not line["in_ground"]:
+                continue
+            middles, across = along(vertices, 2 * QUANTA, 20 * QUANTA)
+            if len(middles) == 0:
+                continue
+            is_alone = np.full(len(middles), True)
+            if steep is not None:
+                nearest = tuple((middles[:, ::-1] / database.spacing).round().astype(int).T)
+                off = np.abs(heights_at(module.ground, *middles.T) - posts[nearest])
+                is_alone = ~steep[nearest] & (off <= 10 * QUANTA)
+            for other in (other for lines in around for other in lines if other is not vertices):
+                is_alone &= others_m * QUANTA < distances(middles, other)
+            for turn in (1, -1):
+                asides = (line["width"] * 0.38, line["width"] / 2 + QUANTA)
+                inner, outer = (heights_at(module.ground, *(middles + turn * across * aside).T) for aside in asides)
+                steps = np.where(is_alone, np.abs(inner - outer), 0) / QUANTA
+                worst = np.nanmax(steps, initial=0)
+                if height_m < worst:
+                    at = middles[np.nanargmax(steps)]
+                    length = 2 * int((height_m < steps).sum())
+                    faults.append(f"a wall of {worst:.2f} m beside a strip at {database.metres(*at)}, {length} m long")
+    return faults
+
+
+def steep_posts(posts, spacing, reach):
+    """Posts that have others within `reach` between which the ground is steeper than 1 : 2, or is not known."""
+    steep = np.zeros(posts.shape, bool)
+    for axis in (0, 1):
+        is_low = np.abs(np.diff(posts, axis=axis)) <= spacing / 2
+        beside = np.insert(is_low, 0, True, axis=axis) & np.insert(is_low, is_low.shape[axis], True, axis=axis)
+        steep |= ~beside
+    cells = math.ceil(reach / spacing)
+    for axis in (0, 1):
+        grown = steep.copy()
+        for shift in range(1, min(cells, steep.shape[axis] - 1) + 1):
+            ahead, behind = [slice(None)] * 2, [slice(None)] * 2
+            ahead[axis], behind[axis] = slice(shift, None), slice(None, -shift)
+            grown[tuple(ahead)] |= steep[tuple(behind)]
+            grown[tuple(behind)] |= steep[tuple(ahead)]
+        steep = grown
+    return steep
+
+
+def along(line, step, ends):
+    """Places along a line, `step` apart and `ends` or more away from its ends, and the directions to their left."""
+    pieces = np.diff(line, axis=0)
+    lengths = np.hypot(*pieces.T)
+    before = np.concatenate([[0], np.cumsum(lengths)])
+    wanted = np.arange(ends, before[-1] - ends, step)
+    piece = np.clip(np.searchsorted(before, wanted, side="right") - 1, 0, len(pieces) - 1)
+    ahead = pieces[piece] / lengths[piece][:, None]
+    return line[piece] + ahead * (wanted - before[piece])[:, None], np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+
+
+def distances(places, line):
+    """How far places lie from a line at least."""
+    least = np.full(len(places), np.inf)
+    for a, b in zip(line, line[1:]):
+        share = np.clip((places - a) @ (b - a) / max((b - a) @ (b - a), 1), 0, 1)
+        least = np.minimum(least, np.hypot(*(places - a - share[:, None] * (b - a)).T))
+    return least
+
+
 def read_posts(path):
     """Posts of an Esri ASCII grid in quanta, from the south-west; NaN for a void."""
     lines = pathlib.Path(path).read_text().split("\n")
@@ -698,7 +775,7 @@ def judge(database, limits_of_job=None, posts=None, own_borders=False, exempt=No
     if posts is not None:
         faults += beyond(database, posts, exempt).faults
     faults += uneven_lakes(database, water) + sunken_decks(database)
-    return faults + feature_lines(database) + rising_lines(database)
+    return faults + feature_lines(database) + rising_lines(database) + walls(database, posts)
 
 
 def heights_at(mesh, x, y):

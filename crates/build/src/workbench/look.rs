@@ -161,9 +161,12 @@ const MODULES_A_TILE_MIN: u32 = 6;
 /// Looks at rasters and finds the area that suits them. `given` is the system of those that name none.
 ///
 /// # Errors
-/// When one cannot be read, or not even two load modules each way fit inside them.
+/// When one cannot be read, `given` is no system, none has a height, or not even two load modules each way fit inside
+/// them.
 pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, CompileError> {
-    let (mut seen, mut frames) = (Vec::new(), Vec::new());
+    // One that no file needs is named rightly nonetheless.
+    given.map_or(Ok(()), |given| crs_named(given).map(drop))?;
+    let (mut seen, mut frames) = (Vec::<Seen>::new(), Vec::new());
     for path in paths {
         let (found, frame) = look(path, given)?;
         frames.push(frame);
@@ -178,6 +181,10 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
         }
         .into()
     };
+    if seen.iter().all(|seen| seen.range_m.is_none()) {
+        let hint = "every post of theirs is void; look at what the files hold, and what marks their voids";
+        return Err(impossible("no height at all".into(), hint.into()));
+    }
     let none = |none: job::NoArea| impossible(none.found, none.hint);
     let crs = area_crs(&frames).map_err(none)?;
     let spacing = spacing_for(&frames, &crs);

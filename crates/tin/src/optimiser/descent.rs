@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use crate::optimiser::heights::is_free;
 use crate::optimiser::parts::{NONE, Vertex};
-use crate::optimiser::place::{PER_POST, Place, Shape};
+use crate::optimiser::place::{PER_POST, Place};
 use crate::optimiser::tile_mesh::TileMesh;
 
 /// Steps that are remembered.
@@ -310,11 +310,7 @@ fn take_back_unsound(sheet: &mut TileMesh, before: &[(Place, f64)]) {
         has_changed = false;
         for index in 0..sheet.triangles.len() {
             let corners = sheet.triangles[index].corners;
-            if !sheet.is_live(index as u32) {
-                continue;
-            }
-            let [a, b, c] = sheet.places(corners);
-            if Shape::Sound.admits(a, b, c) || sheet.is_eased(corners) {
+            if !sheet.is_live(index as u32) || sheet.is_sound(corners) {
                 continue;
             }
             for corner in corners {

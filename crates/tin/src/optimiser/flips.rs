@@ -2,7 +2,7 @@
 
 use crate::optimiser::form::{Form, squares};
 use crate::optimiser::patch::Patch;
-use crate::optimiser::place::{Place, Shape, is_needle};
+use crate::optimiser::place::{Place, is_needle};
 use crate::optimiser::tile_mesh::{TileMesh, next, previous};
 
 /// Passes at most; hardly any mesh needs more than six.
@@ -111,8 +111,7 @@ pub(crate) fn propose(
     let [a, b, c, d] = sheet.around_edge(edge);
     let (first, second) = ([a, d, c], [d, b, c]);
     let (at_first, at_second) = (sheet.places(first), sheet.places(second));
-    let is_sound = |corners: [u32; 3], [a, b, c]: [Place; 3]| Shape::Sound.admits(a, b, c) || sheet.is_eased(corners);
-    if !is_sound(first, at_first) || !is_sound(second, at_second) || sheet.is_constrained(a, b) {
+    if !sheet.is_sound(first) || !sheet.is_sound(second) || sheet.is_constrained(a, b) {
         return None;
     }
     let moments = &sheet.ground.moments;

@@ -3,9 +3,10 @@
 use fearless_simd::{Simd, f64x4, prelude::*};
 
 use crate::optimiser::form::Form;
+use crate::optimiser::hold::Hold;
 use crate::optimiser::moments::{SUMS, Sums};
 use crate::optimiser::patch::Patch;
-use crate::optimiser::place::{Place, Shape, is_eased};
+use crate::optimiser::place::{Place, Shape, is_fit};
 use crate::optimiser::tile_mesh::{TileMesh, next};
 
 /// Corners of a hole, at most.
@@ -22,8 +23,8 @@ pub(crate) struct Hole {
     x: [f64; WIDE],
     y: [f64; WIDE],
     height: [f64; WIDE],
-    /// Whether a corner is given; not asked where there are no features.
-    is_given: [bool; CORNERS_MAX],
+    /// What may not change about a corner; not asked where there are no features.
+    hold: [Hold; CORNERS_MAX],
     has_features: bool,
     /// Quanta between steps of places, as the ground has them.
     quanta_per_step: f64,
@@ -43,7 +44,7 @@ impl Default for Hole {
             x: [0.0; WIDE],
             y: [0.0; WIDE],
             height: [0.0; WIDE],
-            is_given: [false; N],
+            hold: [Hold::FREE; N],
             has_features: false,
             quanta_per_step: f64::INFINITY,
             forth: [[[0.0; WIDE]; SUMS]; N],
@@ -69,7 +70,7 @@ impl Hole {
         }
         for (i, &vertex) in polygon.iter().enumerate() {
             let vertex = &sheet.vertices[vertex as usize];
-            (self.at[i], self.height[i], self.is_given[i]) = (vertex.at, vertex.height, vertex.hold.is_fixed());
+            (self.at[i], self.height[i], self.hold[i]) = (vertex.at, vertex.height, vertex.hold);
             (self.x[i], self.y[i]) = vertex.at.posts();
         }
         (self.has_features, self.quanta_per_step) = (sheet.has_features, sheet.ground.quanta_per_step);
@@ -150,11 +151,11 @@ impl Hole {
     fn is_sound(&self, i: usize, k: usize, j: usize) -> bool {
         let corners = [i, k, j];
         let [a, b, c] = corners.map(|i| self.at[i]);
-        let is_eased = || {
-            let (heights, is_given) = (corners.map(|i| self.height[i]), corners.map(|i| self.is_given[i]));
-            is_eased([a, b, c], heights, is_given, self.quanta_per_step)
-        };
-        Shape::Sound.admits(a, b, c) || (self.has_features && is_eased())
+        if !self.has_features {
+            return Shape::Sound.admits(a, b, c);
+        }
+        let (heights, holds) = (corners.map(|i| self.height[i]), corners.map(|i| self.hold[i]));
+        is_fit([a, b, c], heights, holds, self.quanta_per_step)
     }
 
     #[inline(always)]

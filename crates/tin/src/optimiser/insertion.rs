@@ -5,7 +5,7 @@ use crate::optimiser::hold::Hold;
 use crate::optimiser::moments::Sums;
 use crate::optimiser::parts::NONE;
 use crate::optimiser::patch::Patch;
-use crate::optimiser::place::{Place, Shape};
+use crate::optimiser::place::Place;
 use crate::optimiser::refit::Fit;
 use crate::optimiser::tile_mesh::{TileMesh, next, previous};
 
@@ -140,7 +140,7 @@ impl Insertion {
             }
         }
         self.flip_around(sheet, inserted);
-        let valid = |face: &Face| is_sound(sheet, inserted, [face.from, face.to]);
+        let valid = |face: &Face| sheet.is_sound_at((inserted.at, inserted.height), [face.from, face.to]);
         if !self.faces.iter().all(valid) {
             return None;
         }
@@ -189,7 +189,9 @@ impl Insertion {
         }
         let apex = sheet.apex(face.twin);
         let d = sheet.at(apex);
-        if !is_sound(sheet, inserted, [face.from, apex]) || !is_sound(sheet, inserted, [apex, face.to]) {
+        if !sheet.is_sound_at((inserted.at, inserted.height), [face.from, apex])
+            || !sheet.is_sound_at((inserted.at, inserted.height), [apex, face.to])
+        {
             return None;
         }
         let old = face.squares + sheet.triangles[beyond as usize].squares;
@@ -229,10 +231,6 @@ fn middle_site(sheet: &TileMesh, triangle: u32, k: usize) -> Option<Site> {
     let at = Place::new((a.x + b.x) / 2, (a.y + b.y) / 2);
     let hold = sheet.line_hold(at).and(sheet.ground.height_hold());
     (hold == Hold::FREE && !sheet.ground.is_forbidden(at)).then_some(Site { on_edge: Some(edge), at, hold })
-}
-
-fn is_sound(sheet: &TileMesh, Inserted { at, height, .. }: Inserted, [a, b]: [u32; 2]) -> bool {
-    Shape::Sound.admits(at, sheet.at(a), sheet.at(b)) || sheet.is_eased_at((at, height), [a, b])
 }
 
 impl Face {

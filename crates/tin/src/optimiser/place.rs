@@ -3,6 +3,8 @@
 
 use terrain::{FEATURE_STEPS_MAX, LatticePoint, PostRect, QUANTA_PER_METRE};
 
+use crate::optimiser::hold::Hold;
+
 /// Steps of the working lattice between posts: fine enough that rounding costs nothing (measured), and so coarse that
 /// every orientation is exact.
 pub(crate) const PER_POST: i32 = 64;
@@ -68,11 +70,18 @@ impl Place {
 /// The square of a quarter of a post, in steps.
 const LEAST_ALTITUDE_SQUARED: f64 = (PER_POST / 4 * (PER_POST / 4)) as f64;
 
-/// Whether a triangle that is not sound is as good as its given corners permit: these may stand closer together than a
-/// sound triangle is high, and slopes between them are wanted. Of two such corners the third stands off by a quarter of
-/// a post; three have a triangle, whatever its shape. None may stand like a wall.
-pub(crate) fn is_eased(at: [Place; 3], heights: [f64; 3], is_given: [bool; 3], quanta_per_step: f64) -> bool {
+/// Whether a triangle beside features is one that ground may have. A sound one is, but where it stands like a wall
+/// between a corner of a feature and one that may move, less than a post aside: of that no post tells. One that is not
+/// sound is as good as its given corners permit: these may stand closer together than a sound triangle is high, and
+/// slopes between them are wanted. Of two such corners the third stands off by a quarter of a post; three have a
+/// triangle, whatever its shape. None may stand like a wall.
+pub(crate) fn is_fit(at: [Place; 3], heights: [f64; 3], holds: [Hold; 3], quanta_per_step: f64) -> bool {
+    let is_given = holds.map(Hold::is_fixed);
     let area = Place::orient(at[0], at[1], at[2]);
+    if Shape::Sound.admits(at[0], at[1], at[2]) {
+        let is_between = holds.iter().any(|hold| hold.has(Hold::FEATURE)) && is_given.contains(&false);
+        return !(is_between && is_low(at, area) && is_wall(at, heights, quanta_per_step));
+    }
     let stands = match is_given {
         [true, true, true] => 0 < area,
         [true, true, false] => stands_off(area, at[0], at[1]),
@@ -81,6 +90,13 @@ pub(crate) fn is_eased(at: [Place; 3], heights: [f64; 3], is_given: [bool; 3], q
         _ => false,
     };
     stands && !is_wall(at, heights, quanta_per_step)
+}
+
+/// Whether a triangle is less than a post high over its longest side.
+fn is_low(at: [Place; 3], area: i64) -> bool {
+    let long = |k: usize| at[k].squared_distance(at[(k + 1) % 3]);
+    let longest = long(0).max(long(1)).max(long(2)) as f64;
+    (area as f64).powi(2) < longest * f64::from(PER_POST * PER_POST)
 }
 
 /// Whether a corner of a triangle is farther above or below its longest side than aside of it, and by more than half a
@@ -182,14 +198,33 @@ mod tests {
     fn given_corners_permit_a_low_triangle_but_no_wall() {
         let places = [Place::new(0, 0), Place::new(8 * PER_POST, 0), Place::new(4 * PER_POST, PER_POST / 64)];
         let quanta_per_step = 4000.0 / f64::from(PER_POST);
-        let eased = |height: f64, given| is_eased(places, [0.0, 0.0, height], given, quanta_per_step);
+        let given = Hold::GIVEN.and(Hold::FEATURE);
+        let fit = |height: f64, holds| is_fit(places, [0.0, 0.0, height], holds, quanta_per_step);
         // It lies 62.5 quanta aside of the longest side, and 64 are half a metre.
         assert_eq!(
-            [0.0, 60.0, 65.0, -500.0, 500.0].map(|height| eased(height, [true; 3])),
+            [0.0, 60.0, 65.0, -500.0, 500.0].map(|height| fit(height, [given; 3])),
             [true, true, false, false, false]
         );
-        assert!(!eased(0.0, [true, true, false]), "one that is not given stands off");
-        assert!(is_eased(places, [0.0, 0.0, 500.0], [true; 3], f64::INFINITY), "where no spacing is known");
+        assert!(!fit(0.0, [given, given, Hold::FREE]), "one that is not given stands off");
+        assert!(is_fit(places, [0.0, 0.0, 500.0], [given; 3], f64::INFINITY), "where no spacing is known");
+    }
+
+    #[test]
+    fn less_than_a_post_beside_a_feature_no_sound_triangle_stands_like_a_wall() {
+        let given = Hold::GIVEN.and(Hold::FEATURE);
+        // A third of a post aside of a long edge, 333 quanta.
+        let fit = |aside: i32, height: f64, holds| {
+            let places = [Place::new(0, 0), Place::new(8 * PER_POST, 0), Place::new(4 * PER_POST, aside)];
+            is_fit(places, [0.0, 0.0, height], holds, 1000.0 / f64::from(PER_POST))
+        };
+        let beside = [given, given, Hold::FREE];
+        assert_eq!(
+            [0.0, 300.0, -400.0, 400.0].map(|height| fit(PER_POST / 3, height, beside)),
+            [true, true, false, false]
+        );
+        assert!(fit(PER_POST / 3, 400.0, [given; 3]), "three given corners are what they are");
+        assert!(fit(PER_POST / 3, 400.0, [Hold::GIVEN, Hold::GIVEN, Hold::FREE]), "those of seams are no feature's");
+        assert!(fit(PER_POST, 2000.0, beside), "a post tells of that");
     }
 
     #[test]

@@ -285,9 +285,11 @@ impl Mover {
     #[inline(always)]
     fn leaves(&self, sheet: &TileMesh, (at, height): (Place, f64), shape: Shape) -> bool {
         (0..self.star.edges.len()).all(|i| {
+            if shape == Shape::Sound && sheet.has_features {
+                return sheet.is_sound_at((at, height), [self.star.ring[i], self.star.ring[self.after(i)]]);
+            }
             let [a, b] = self.opposite(i);
-            let ring = || [self.star.ring[i], self.star.ring[self.after(i)]];
-            shape.admits(at, a.0, b.0) || (shape == Shape::Sound && sheet.is_eased_at((at, height), ring()))
+            shape.admits(at, a.0, b.0)
         })
     }
 

@@ -7,7 +7,7 @@ use crate::optimiser::hold::Hold;
 use crate::optimiser::moments::Sums;
 use crate::optimiser::parts::{NONE, Parts, Vertex, line_hold};
 use crate::optimiser::place::along_curve;
-use crate::optimiser::place::{Place, is_eased};
+use crate::optimiser::place::{Place, Shape, is_fit};
 use crate::optimiser::weighted_heights::WeightedHeights;
 
 /// One triangle, counter-clockwise. An edge is `4 * triangle + corner it leaves`.
@@ -257,22 +257,26 @@ impl<'a> TileMesh<'a> {
         self.kept.binary_search(&[a.min(b), a.max(b)]).is_ok()
     }
 
-    /// Whether a triangle that is not sound is as good as its given corners permit.
-    pub fn is_eased(&self, corners: [u32; 3]) -> bool {
-        let is_given = || corners.map(|corner| self.is_given(corner));
-        let (at, heights) = (self.places(corners), self.heights(corners));
-        self.has_features && is_eased(at, heights, is_given(), self.ground.quanta_per_step)
+    /// Whether a triangle between three vertices is one that ground may have.
+    #[inline(always)]
+    pub fn is_sound(&self, corners: [u32; 3]) -> bool {
+        let [a, b, c] = self.places(corners);
+        if !self.has_features {
+            return Shape::Sound.admits(a, b, c);
+        }
+        let holds = corners.map(|corner| self.vertices[corner as usize].hold);
+        is_fit([a, b, c], self.heights(corners), holds, self.ground.quanta_per_step)
     }
 
     /// The same of a triangle between a place, with a height in quanta, and two vertices.
-    pub fn is_eased_at(&self, (at, height): (Place, f64), [a, b]: [u32; 2]) -> bool {
+    #[inline(always)]
+    pub fn is_sound_at(&self, (at, height): (Place, f64), [a, b]: [u32; 2]) -> bool {
         let [a, b] = [a, b].map(|vertex| &self.vertices[vertex as usize]);
-        let (at, is_given) = ([at, a.at, b.at], [false, a.hold.is_fixed(), b.hold.is_fixed()]);
-        self.has_features && is_eased(at, [height, a.height, b.height], is_given, self.ground.quanta_per_step)
-    }
-
-    pub fn is_given(&self, vertex: u32) -> bool {
-        self.vertices[vertex as usize].hold.is_fixed()
+        if !self.has_features {
+            return Shape::Sound.admits(at, a.at, b.at);
+        }
+        let (heights, holds) = ([height, a.height, b.height], [Hold::FREE, a.hold, b.hold]);
+        is_fit([at, a.at, b.at], heights, holds, self.ground.quanta_per_step)
     }
 
     /// The post of largest weighted residual under a triangle where a vertex may come, and that residual in quanta:
