@@ -232,7 +232,7 @@ pub(crate) fn entered(prism: &Prism, line: &Line) -> f64 {
         for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)).filter(|(a, _)| a.has_wall) {
             let [a, b] = [a, b].map(|corner| [f64::from(corner.x), f64::from(corner.y), 0.0]);
             let ((left_a, ahead_a), (left_b, ahead_b)) = (line.seen(a), line.seen(b));
-            if (0.0 < left_a) == (0.0 < left_b) {
+            if line.is_left(left_a) == line.is_left(left_b) {
                 continue;
             }
             let share = left_a / (left_a - left_b);

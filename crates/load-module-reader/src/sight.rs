@@ -35,6 +35,14 @@ impl Line {
         (self.along[0] * dy - self.along[1] * dx, self.along[0] * dx + self.along[1] * dy)
     }
 
+    /// Whether a place that lies so far left of the line counts as left of it. One on the line counts as south of it,
+    /// or west, since what lies on a line between load modules is looked up in the one north or east of it: so a line
+    /// meets the same from both of its ends.
+    pub(crate) fn is_left(&self, left: f64) -> bool {
+        let is_west_left = self.along[0] == 0.0 && 0.0 < self.along[1];
+        if self.along[0] < 0.0 || is_west_left { 0.0 <= left } else { 0.0 < left }
+    }
+
     /// Height of the line at a share of it.
     pub(crate) fn height(&self, at: f64) -> f64 {
         self.heights[0] + at * (self.heights[1] - self.heights[0]) - self.sag * at * (1.0 - at)
@@ -199,8 +207,8 @@ fn above(line: f64, deck: f64) -> f64 {
 
 /// The part of a line over or under a triangle: how far along it begins and ends, and the triangle's height there.
 pub(crate) fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]> {
-    // Most triangles beside a line are not crossed; what lies on the line counts as right of it.
-    let is_left = corners.map(|corner| 0.0 < line.seen(corner.map(f64::from)).0);
+    // Most triangles beside a line are not crossed.
+    let is_left = corners.map(|corner| line.is_left(line.seen(corner.map(f64::from)).0));
     if is_left[0] == is_left[1] && is_left[1] == is_left[2] {
         return None;
     }
@@ -212,7 +220,7 @@ pub(crate) fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]>
         let (a, b) = (a.map(f64::from), b.map(f64::from));
         let ((left_a, ahead_a), (left_b, ahead_b)) = (line.seen(a), line.seen(b));
         // None or two of the edges are crossed.
-        if (0.0 < left_a) == (0.0 < left_b) {
+        if line.is_left(left_a) == line.is_left(left_b) {
             continue;
         }
         let share = left_a / (left_a - left_b);

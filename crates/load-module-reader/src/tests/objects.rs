@@ -248,6 +248,25 @@ fn without_objects_answers_are_those_of_the_ground_bit_by_bit() {
 }
 
 #[test]
+fn along_a_line_between_load_modules_what_stands_over_it_hides_from_both_ends() {
+    let west = [[0, 20_000], [6_000, 20_000], [6_000, 40_000], [0, 40_000]];
+    let south = [[20_000, 0], [40_000, 0], [40_000, 6_000], [20_000, 6_000]];
+    let prism = |id, places: &[[u16; 2]]| {
+        let rings = vec![ring(places)];
+        Prism { id, kind: ObjectKind::Building, base: 128_000, roof: 129_000, rings }
+    };
+    let (ground, _) = ground_with(Objects { prisms: vec![prism(1, &west), prism(2, &south)], ..Objects::default() });
+    let past = PastObjects::all(Curvature::NONE);
+    let hides = |from: [f64; 2], to: [f64; 2]| {
+        let place = |[x, y]: [f64; 2]| [CORNER[0] + x, CORNER[1] + y, 1004.0];
+        ground.sight_past(place(from), place(to), &past).by
+    };
+    for (from, to) in [([500.0, 50.0], [500.0, 450.0]), ([50.0, 0.0], [450.0, 0.0])] {
+        assert_eq!([hides(from, to), hides(to, from)], [Some(Hider::Building); 2], "{from:?} {to:?}");
+    }
+}
+
+#[test]
 fn roofs_are_stood_on_and_walls_have_two_sides() {
     let block = |base, roof| Prism {
         id: 1,
