@@ -1,11 +1,9 @@
 //! Levels of detail inside files: the one list of a product's levels from fine to coarse, how far each lies from the
 //! ground, and from how far away it will do.
 
-use std::collections::BTreeSet;
+use terrain::{HOLE_CLASS, LoadModule, ModuleRect, QUANTA_PER_METRE};
 
-use terrain::{HOLE_CLASS, ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
-
-use crate::triangle_index::TriangleIndex;
+use crate::triangle_index::{Cells, corners_of, height_in};
 use crate::{Mesh, Product};
 
 /// Metres of distance at which a metre of error will do: it is a milliradian there, about a pixel of a picture that is
@@ -71,23 +69,47 @@ pub(crate) fn largest_residual_m(product: &Product, rect: ModuleRect) -> f64 {
 }
 
 /// The largest distance, straight up or down, between the ground of two products of the same load modules in a
-/// rectangle, at the vertices of either, in metres; over holes there is no ground.
+/// rectangle, in metres; over holes there is no ground. Both are flat between edges, so it is found at a vertex of
+/// either, or where edges cross.
 fn largest_distance_m(one: &Product, other: &Product, rect: ModuleRect) -> f64 {
-    let mut largest_m: f64 = 0.0;
-    for (from, to) in [(one, other), (other, one)] {
-        let mut index = TriangleIndex::new(to);
-        for (module, there) in rect.iter().filter_map(|id| from.module(id).zip(to.module(id))) {
-            let grounds = module.triangles.iter().zip(&module.classes).filter(|(_, class)| **class != HOLE_CLASS);
-            let corners: BTreeSet<u16> = grounds.flat_map(|(triangle, _)| *triangle).collect();
-            for vertex in corners.into_iter().map(|corner| module.vertices[usize::from(corner)]) {
-                let ground = index.in_module(there, [f64::from(vertex.x), f64::from(vertex.y)]);
-                if let Some(ground) = ground.filter(|ground| ground.class != HOLE_CLASS) {
-                    largest_m = largest_m.max((ground.height_m - metres_of_quanta(vertex.z)).abs());
+    let mut largest = 0.0;
+    for id in rect.iter() {
+        let Some((one, other)) = one.module(id).zip(other.module(id)) else { continue };
+        let cells = Cells::of(other);
+        for corners in ground_of(one) {
+            for number in cells.meeting(corners) {
+                if other.classes[number as usize] != HOLE_CLASS {
+                    largest = f64::max(largest, distance(corners, corners_of(other, other.triangles[number as usize])));
                 }
             }
         }
     }
-    largest_m
+    largest / f64::from(QUANTA_PER_METRE)
+}
+
+/// The triangles of a load module that have ground.
+fn ground_of(module: &LoadModule) -> impl Iterator<Item = [[f64; 3]; 3]> {
+    let all = module.triangles.iter().zip(&module.classes);
+    all.filter(|(_, class)| **class != HOLE_CLASS).map(|(triangle, _)| corners_of(module, *triangle))
+}
+
+/// The largest distance between two triangles over what they have in common, in quanta.
+fn distance(one: [[f64; 3]; 3], other: [[f64; 3]; 3]) -> f64 {
+    let at_corners = |of: [[f64; 3]; 3], from: [[f64; 3]; 3]| {
+        let off = from.map(|[x, y, z]| height_in(of, [x, y]).map_or(0.0, |height| (height - z).abs()));
+        off.into_iter().fold(0.0, f64::max)
+    };
+    let edges = |of: [[f64; 3]; 3]| [[of[0], of[1]], [of[1], of[2]], [of[2], of[0]]];
+    let crossings = edges(one).into_iter().flat_map(|[a, b]| {
+        edges(other).into_iter().filter_map(move |[c, d]| {
+            let turn = (b[0] - a[0]) * (d[1] - c[1]) - (b[1] - a[1]) * (d[0] - c[0]);
+            let along = ((c[0] - a[0]) * (d[1] - c[1]) - (c[1] - a[1]) * (d[0] - c[0])) / turn;
+            let share = ((c[0] - a[0]) * (b[1] - a[1]) - (c[1] - a[1]) * (b[0] - a[0])) / turn;
+            let is_met = (0.0..=1.0).contains(&along) && (0.0..=1.0).contains(&share);
+            is_met.then(|| (a[2] + along * (b[2] - a[2]) - c[2] - share * (d[2] - c[2])).abs())
+        })
+    });
+    crossings.fold(at_corners(one, other).max(at_corners(other, one)), f64::max)
 }
 
 /// The share of a picture that a square of `side_m` fills at most, seen from `away_m`.

@@ -1,6 +1,6 @@
 //! The triangle of a product's ground at any place, found by the cells of its load module.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use terrain::{LoadModule, ModuleId, QUANTA_PER_METRE};
 
@@ -41,25 +41,20 @@ impl<'a> TriangleIndex<'a> {
             return None;
         }
         let (module, place) = module_at(product, place_m)?;
-        self.in_module(module, place)
-    }
-
-    /// The ground at a place of a load module of the product, east and north of its corner in quanta.
-    pub(crate) fn in_module(&mut self, module: &LoadModule, place: [f64; 2]) -> Option<Ground> {
         let cells = self.cells.entry(module.id).or_insert_with(|| Cells::of(module));
         triangle_at(module, cells.candidates(place), place)
     }
 }
 
 /// Numbers of the triangles of a load module that may meet each of its cells.
-struct Cells {
+pub(crate) struct Cells {
     per_side: usize,
     side: f64,
     triangles: Vec<Vec<u32>>,
 }
 
 impl Cells {
-    fn of(module: &LoadModule) -> Self {
+    pub(crate) fn of(module: &LoadModule) -> Self {
         let per_side = (module.triangles.len() / TRIANGLES_PER_CELL).isqrt().clamp(1, CELLS_MAX);
         let mut cells =
             Self { per_side, side: f64::from(module.side), triangles: vec![Vec::new(); per_side * per_side] };
@@ -82,6 +77,16 @@ impl Cells {
         ((quanta / self.side * self.per_side as f64) as usize).min(self.per_side - 1)
     }
 
+    /// Numbers of the triangles that may meet another one, each once.
+    pub(crate) fn meeting(&self, corners: [[f64; 3]; 3]) -> BTreeSet<u32> {
+        let range = |axis: usize| {
+            let [a, b, c] = corners.map(|corner| self.cell(corner[axis]));
+            a.min(b).min(c)..=a.max(b).max(c)
+        };
+        let cells = range(1).flat_map(|row| range(0).map(move |col| row * self.per_side + col));
+        cells.flat_map(|at| &self.triangles[at]).copied().collect()
+    }
+
     fn candidates(&self, [x, y]: [f64; 2]) -> &[u32] {
         &self.triangles[self.cell(y) * self.per_side + self.cell(x)]
     }
@@ -98,21 +103,36 @@ fn module_at(product: &Product, [east_m, north_m]: [f64; 2]) -> Option<(&LoadMod
     Some((product.module(id)?, [(x - corner[0]) * quanta, (y - corner[1]) * quanta]))
 }
 
+/// Corners of a triangle of a load module, in quanta.
+pub(crate) fn corners_of(module: &LoadModule, triangle: [u16; 3]) -> [[f64; 3]; 3] {
+    triangle.map(|v| {
+        let v = module.vertices[usize::from(v)];
+        [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
+    })
+}
+
+/// The height of a triangle at a place in it, or on its border.
+pub(crate) fn height_in(corners: [[f64; 3]; 3], place: [f64; 2]) -> Option<f64> {
+    let (least, height) = plane_at(corners, place);
+    (0.0 <= least).then_some(height)
+}
+
+/// The least share that a corner of a triangle has in a place, negative outside of it, and the height of its plane.
+fn plane_at([a, b, c]: [[f64; 3]; 3], [x, y]: [f64; 2]) -> (f64, f64) {
+    let left = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+    let shares = [left(b, c), left(c, a), left(a, b)];
+    let whole: f64 = shares.iter().sum();
+    let least = shares.iter().fold(f64::INFINITY, |least, share| least.min(share / whole));
+    (least, (a[2] * shares[0] + b[2] * shares[1] + c[2] * shares[2]) / whole)
+}
+
 /// The ground at a place in quanta, of the first of some triangles that has it, or else of the one next to it.
-fn triangle_at(module: &LoadModule, candidates: &[u32], [x, y]: [f64; 2]) -> Option<Ground> {
+fn triangle_at(module: &LoadModule, candidates: &[u32], place: [f64; 2]) -> Option<Ground> {
     let mut best = (f64::NEG_INFINITY, None);
     for &number in candidates {
-        let [a, b, c] = module.triangles[number as usize].map(|v| {
-            let v = module.vertices[usize::from(v)];
-            [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
-        });
-        let left = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
-        let shares = [left(b, c), left(c, a), left(a, b)];
-        let whole: f64 = shares.iter().sum();
-        let least = shares.iter().fold(f64::INFINITY, |least, share| least.min(share / whole));
+        let (least, height) = plane_at(corners_of(module, module.triangles[number as usize]), place);
         if best.0 < least {
-            let quanta = (a[2] * shares[0] + b[2] * shares[1] + c[2] * shares[2]) / whole;
-            let height_m = quanta / f64::from(QUANTA_PER_METRE);
+            let height_m = height / f64::from(QUANTA_PER_METRE);
             best = (least, Some(Ground { height_m, class: module.classes[number as usize] }));
         }
         if 0.0 <= least {

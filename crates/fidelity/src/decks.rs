@@ -9,6 +9,9 @@ use crate::places::{each_under, height_in};
 /// Quanta between places at which decks are sampled: a metre.
 const SAMPLE: i32 = 128;
 
+/// Quanta from the end of a bridge within which ways may lead onto it: 30 m.
+const APART: f64 = 3840.0;
+
 /// Quanta that a deck may lie under the ground on which it rests: 5 cm, which is what raising its corners leaves.
 const ROUNDING: i32 = 6;
 
@@ -22,8 +25,8 @@ pub struct DeckFigures {
     /// How far it does at most, in quanta.
     pub deepest: u32,
     /// The least height of a deck above what it crosses, by the class of that, in quanta: above ways and rivers where
-    /// middle lines cross, above level ground of a class that has no middle line, such as lakes, anywhere. Beside its
-    /// ends, where the ground rises to it, a deck crosses nothing.
+    /// middle lines cross, or run below the deck 30 m and more from where bridges end, above level ground of a class that
+    /// has no middle line, such as lakes, anywhere.
     pub clearance: BTreeMap<u8, i32>,
 }
 
@@ -46,7 +49,7 @@ impl DeckFigures {
                 figures.add_clearance(class, height.floor() as i32);
             }
         });
-        for (class, height) in crossed(&module.lines) {
+        for (class, height) in crossed(&module.lines).into_iter().chain(passed(module)) {
             figures.add_clearance(class, height);
         }
         for under in above.into_iter().map(|above| -above.floor() as i32).filter(|under| ROUNDING < *under) {
@@ -75,12 +78,39 @@ impl DeckFigures {
 fn crossed(lines: &[ModuleLine]) -> Vec<(u8, i32)> {
     let is_bridge = |line: &&ModuleLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
     let bridges: Vec<Segment> = lines.iter().filter(is_bridge).flat_map(segments).collect();
-    let below = lines.iter().filter(|line| line.traits.storey == LineStorey::Ground && line.traits.is_in_ground);
     let crossings = |line: &ModuleLine| -> Vec<(u8, i32)> {
         let pairs = segments(line).into_iter().flat_map(|under| bridges.iter().map(move |over| (over, under)));
         pairs.filter_map(|(over, under)| Some((line.class, over.height_over(under)?.floor() as i32))).collect()
     };
-    below.flat_map(crossings).collect()
+    lines.iter().filter(|line| is_below(line)).flat_map(crossings).collect()
+}
+
+/// Class of each line in the ground that runs under a deck, and how high the deck passes over it, in quanta, at a place
+/// in every metre of it that lies apart from where bridges end: beside these, ways lead onto them.
+fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
+    let deck = |triangle: &[u16; 3]| {
+        let corners = triangle.map(|corner| module.decks.vertices[usize::from(corner)]);
+        corners.map(|corner| [f64::from(corner.x), f64::from(corner.y), f64::from(corner.z)])
+    };
+    let decks: Vec<[[f64; 3]; 3]> = module.decks.triangles.iter().map(deck).collect();
+    let bridges = module.lines.iter().filter(|line| line.traits.storey == LineStorey::Bridge);
+    let end = |vertex: &ModuleVertex| [f64::from(vertex.x), f64::from(vertex.y)];
+    let ends: Vec<[f64; 2]> =
+        bridges.flat_map(|line| line.vertices.first().into_iter().chain(line.vertices.last())).map(end).collect();
+    let is_apart = |[x, y, _]: [f64; 3]| ends.iter().all(|end| APART < (x - end[0]).hypot(y - end[1]));
+    let mut found = Vec::new();
+    for line in module.lines.iter().filter(|line| is_below(line)) {
+        for place in segments(line).iter().flat_map(Segment::samples).filter(|place| is_apart(*place)) {
+            let over = decks.iter().filter_map(|deck| height_in(*deck, [place[0], place[1]]));
+            found.extend(over.map(|height| (line.class, (height - place[2]).floor() as i32)));
+        }
+    }
+    found
+}
+
+/// Whether a line is one that bridges pass over.
+fn is_below(line: &ModuleLine) -> bool {
+    line.traits.storey == LineStorey::Ground && line.traits.is_in_ground
 }
 
 /// Two neighbouring vertices of a line, and which of them are its ends.
@@ -101,6 +131,14 @@ fn segments(line: &ModuleLine) -> Vec<Segment> {
 }
 
 impl Segment {
+    /// Places along it, a metre apart at most, the last vertex left out.
+    fn samples(&self) -> impl Iterator<Item = [f64; 3]> {
+        let [a, b] = self.places;
+        let count = ((b[0] - a[0]).hypot(b[1] - a[1]) / f64::from(SAMPLE)).ceil();
+        let place = move |step: u32| [0, 1, 2].map(|axis| a[axis] + f64::from(step) / count * (b[axis] - a[axis]));
+        (0..count as u32).map(place)
+    }
+
     /// How high it passes over another that it crosses, other than at an end of both lines.
     fn height_over(&self, under: Self) -> Option<f64> {
         let ([a, b], [c, d]) = (self.places, under.places);
@@ -213,6 +251,16 @@ mod tests {
         ];
         module.lines[4].traits.is_kept = false;
         assert_eq!(DeckFigures::of(&module).clearance, [(1, 500)].into());
+        // A road alongside, under the deck's side: told where it is apart from the bridge's ends.
+        let ends = [(4000, 0, 256), (5280, 0, 256), (5280, 10_240, 768), (4000, 10_240, 768)];
+        let corners = ends.map(|(x, y, z)| vertex(x, y, z));
+        module.decks = Decks::of_triangles([[0, 1, 2], [0, 2, 3]].map(|of| (of.map(|corner| corners[corner]), 3)));
+        module.lines = vec![
+            line(3, LineStorey::Bridge, &[(4640, 0, 256), (4640, 10_240, 768)]),
+            line(2, LineStorey::Ground, &[(5000, 0, 100), (5000, 10_240, 100)]),
+        ];
+        let least = DeckFigures::of(&module).clearance[&2];
+        assert!((256 + 512 * 3840 / 10_240 - 100..=256 + 512 * 4000 / 10_240 - 100).contains(&least), "{least}");
     }
 
     #[test]

@@ -180,7 +180,7 @@ pub struct ReportFeatureChecks {
 pub struct ReportDeckClearance {
     /// Name of the class.
     pub class: String,
-    /// The least height of a deck above what it crosses of the class, in metres: where middle lines cross, or anywhere
-    /// over level water.
+    /// The least height of a deck above what it crosses of the class, in metres: where middle lines cross or run
+    /// below it apart from its ends, and over level water.
     pub least_m: f64,
 }

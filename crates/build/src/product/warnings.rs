@@ -6,7 +6,7 @@
 //! that read them; the guide lists all in one table.
 
 use job::Job;
-use store::{AreaLevel, FeatureAmounts, ObjectSums, Report};
+use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance};
 
 use crate::product::earthworks;
 
@@ -44,7 +44,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 18] = [
+pub(crate) const MATTERS: [Matter; 19] = [
     matter(
         "files, datums, holes and rules of sources, or metres of the area's system, that are not as they should be",
         Told::OfStage,
@@ -86,6 +86,11 @@ pub(crate) const MATTERS: [Matter; 18] = [
         "bridges through ground that is higher",
         Told::Warning(through_hills),
         "tunnels are assumed there, and features.geojson lists each; the bridge or the DEM is elsewhere",
+    ),
+    matter(
+        "decks below what they cross",
+        Told::Warning(decks_below),
+        "a bridge passes over what it crosses; which of them is the higher is wrong in the data, or the heights are",
     ),
     matter(
         "decks too low over what they cross",
@@ -157,6 +162,16 @@ fn decks_under(made: &Made) -> Vec<String> {
         )
     };
     (0 < checks.deck_samples_under).then(told).into_iter().collect()
+}
+
+/// Bridges lie lower than the ways and the water that they cross.
+fn decks_below(made: &Made) -> Vec<String> {
+    let all = made.report.features.iter().flat_map(|features| &features.deck_clearances);
+    let below = all.filter(|over| over.least_m < 0.0);
+    let told = |over: &ReportDeckClearance| {
+        format!("a deck lies {:.2} m below what it crosses of {}, see features.geojson", -over.least_m, over.class)
+    };
+    below.map(told).collect()
 }
 
 /// Bridges would run through hills.

@@ -456,6 +456,10 @@ fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Resul
 }
 
 fn write_features(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.modules.is_some() {
+        let message = "found --modules with --format features, which writes roads and water of the whole area";
+        return Err(Failure::new(message, "leave it out, or export a block with --format gpkg, whose lines are cut"));
+    }
     let opened = Opened::open(arguments.database())?;
     let Some((level, told)) = read_told(&opened)? else {
         let message = "found --format features with a database without roads and water, expected one with some";

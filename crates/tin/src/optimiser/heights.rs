@@ -1,5 +1,7 @@
 //! All heights at once: the squares are a quadratic form in them, and conjugate gradients bring it down.
 
+use terrain::geometry::BEYOND_LEAST;
+
 use crate::optimiser::parts::{NONE, Vertex};
 use crate::optimiser::refit::DAMPING;
 use crate::optimiser::tile_mesh::TileMesh;
@@ -34,6 +36,40 @@ pub(crate) fn fit_heights(sheet: &mut TileMesh, steps: usize) {
     }
     for ((vertex, rise), _) in sheet.vertices.iter_mut().zip(rise).zip(is_free).filter(|(_, is_free)| *is_free) {
         vertex.height = sheet.ground.bounded(vertex.at, vertex.height + rise);
+    }
+    live.into_iter().for_each(|triangle| sheet.settle(triangle));
+}
+
+/// Brings back the heights of vertices of which posts hardly tell anything: to those of their neighbours and of the
+/// ground where they stand, and a metre or a tenth of that range beyond. Among triangles smaller than posts are apart,
+/// beside features, a post near the foot of a triangle raised its top many times as far as it lay off itself.
+pub(crate) fn bind_loose_heights(sheet: &mut TileMesh) {
+    /// Squares of the shares that posts have in a height, below which it is loose.
+    const LOOSE: f64 = 0.25;
+    let live: Vec<u32> = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle)).collect();
+    let mut told = vec![0.0; sheet.vertices.len()];
+    let mut ends = vec![[f64::INFINITY, f64::NEG_INFINITY]; sheet.vertices.len()];
+    for &triangle in &live {
+        let corners = sheet.triangles[triangle as usize].corners.map(|corner| corner as usize);
+        let heights = sheet.heights(sheet.triangles[triangle as usize].corners);
+        for k in 0..3 {
+            told[corners[k]] += sheet.forms[triangle as usize].aa[k];
+            for other in [heights[(k + 1) % 3], heights[(k + 2) % 3]] {
+                let [low, high] = ends[corners[k]];
+                ends[corners[k]] = [low.min(other), high.max(other)];
+            }
+        }
+    }
+    let ground = sheet.ground;
+    for ((vertex, told), [low, high]) in sheet.vertices.iter_mut().zip(told).zip(ends) {
+        let is_loose = told < LOOSE * ground.weight_in_squares(vertex.at);
+        if vertex.edge == NONE || !is_loose || !vertex.hold.height_is_free() {
+            continue;
+        }
+        let here = ground.height(vertex.at);
+        let [low, high] = [low.min(here), high.max(here)];
+        let beyond = ((high - low) / 10.0).max(f64::from(BEYOND_LEAST));
+        vertex.height = ground.bounded(vertex.at, vertex.height.clamp(low - beyond, high + beyond));
     }
     live.into_iter().for_each(|triangle| sheet.settle(triangle));
 }

@@ -115,12 +115,6 @@ impl Sums {
 
 #[cfg(test)]
 impl Moments {
-    /// What one post counts.
-    pub fn weight_at(&self, row: i32, col: i32) -> f64 {
-        let at = row as usize * self.stride + col as usize;
-        self.heights[at + 1][1] - self.heights[at][1]
-    }
-
     /// Sums over the posts that a counter-clockwise triangle owns.
     pub fn triangle(&self, [a, b, c]: [Place; 3]) -> Sums {
         self.edge(a, b) + self.edge(b, c) + self.edge(c, a)
@@ -159,6 +153,12 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
+    /// What one post counts.
+    pub fn weight_at(&self, row: i32, col: i32) -> f64 {
+        let at = row as usize * self.stride + col as usize;
+        self.heights[at + 1][1] - self.heights[at][1]
+    }
+
     /// The sums of a window; a post counts with the square of its weight, as a part of the largest there.
     pub fn new(dem: &Dem, importance: &Importance) -> Self {
         let rect = dem.rect();

@@ -86,6 +86,12 @@ impl<'a> WeightedHeights<'a> {
         !self.forbidden.is_empty() && self.forbidden.binary_search(&self.post(nearest(at.y), nearest(at.x))).is_ok()
     }
 
+    /// What the post nearest to a place counts in squares.
+    pub fn weight_in_squares(&self, at: Place) -> f64 {
+        let nearest = |at: i32| (at + PER_POST / 2) / PER_POST;
+        self.moments.weight_at(nearest(at.y), nearest(at.x))
+    }
+
     /// Whether the post nearest to a place has a weight.
     pub fn counts(&self, at: Place) -> bool {
         let nearest = |v: i32| (v + PER_POST / 2).div_euclid(PER_POST);
