@@ -25,8 +25,8 @@ pub struct DeckFigures {
     /// How far it does at most, in quanta.
     pub deepest: u32,
     /// The least height of a deck above what it crosses, by the class of that, in quanta: above ways and rivers where
-    /// middle lines cross, or run below the deck 30 m and more from where bridges end, above level ground of a class that
-    /// has no middle line, such as lakes, anywhere.
+    /// middle lines cross, or run below the deck 30 m and more from where bridges end, above level ground of a class
+    /// that has no middle line, such as lakes, anywhere.
     pub clearance: BTreeMap<u8, i32>,
 }
 

@@ -281,8 +281,7 @@ fn levels(arguments: &Arguments) -> Levels {
 
 /// Does it; what was exported, in words.
 fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
-    let is_folder = arguments.format.extensions().is_empty();
-    let folder = is_folder.then(|| NewFolder::begin(&arguments.out)).transpose()?;
+    let folder = arguments.format.extensions().is_empty().then(|| NewFolder::begin(&arguments.out)).transpose()?;
     let product = prepared(arguments, arguments.database(), work)?;
     tell_size(arguments, &product)?;
     match arguments.format {
@@ -457,14 +456,13 @@ fn write_package(arguments: &Arguments, product: &Product, work: &Work) -> Resul
 
 fn write_features(arguments: &Arguments) -> Result<(), Failure> {
     if arguments.modules.is_some() {
-        let message = "found --modules with --format features, which writes roads and water of the whole area";
-        return Err(Failure::new(message, "leave it out, or export a block with --format gpkg, whose lines are cut"));
+        let message = "found --modules with --format features, which writes those of the whole area";
+        return Err(Failure::new(message, "leave it out, or export a block with --format gpkg"));
     }
     let opened = Opened::open(arguments.database())?;
-    let Some((level, told)) = read_told(&opened)? else {
-        let message = "found --format features with a database without roads and water, expected one with some";
-        return Err(Failure::new(message, "[features] in a job names their files"));
-    };
+    let missing = "found --format features with a database without roads and water, expected one with some";
+    let missing = || Failure::new(missing, "[features] in a job names their files");
+    let (level, told) = read_told(&opened)?.ok_or_else(missing)?;
     let bytes = build::product::features_package(&opened.job, &level, &told.remarks).map_err(CompileError::from)?;
     files::write_whole(&arguments.out, |out| std::io::Write::write_all(out, &bytes))
 }

@@ -4,6 +4,7 @@ use terrain::StopReason;
 
 use crate::optimiser::account::Account;
 use crate::optimiser::gains::Gains;
+use crate::optimiser::heights::round_heights;
 use crate::optimiser::parts::NONE;
 use crate::optimiser::thin::{Filling, Until};
 use crate::optimiser::tile_mesh::TileMesh;
@@ -59,7 +60,7 @@ impl Work<'_, '_> {
                     self.insert_worst(triangle);
                 }
             }
-            self.sheet.round_heights();
+            round_heights(&mut self.sheet);
         }
         if let Some((_, sheet, account)) = least {
             (self.sheet, self.account) = (sheet, account);

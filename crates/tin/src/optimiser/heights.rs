@@ -1,4 +1,5 @@
-//! All heights at once: the squares are a quadratic form in them, and conjugate gradients bring it down.
+//! All heights at once: the squares are a quadratic form in them, and conjugate gradients bring it down; what is loose
+//! is bound, and all are rounded.
 
 use terrain::geometry::BEYOND_LEAST;
 
@@ -40,10 +41,26 @@ pub(crate) fn fit_heights(sheet: &mut TileMesh, steps: usize) {
     live.into_iter().for_each(|triangle| sheet.settle(triangle));
 }
 
+/// Rounds all heights to whole quanta, which is how they are kept; beside features loose ones are bound first.
+pub(crate) fn round_heights(sheet: &mut TileMesh) {
+    if sheet.has_features {
+        bind_loose_heights(sheet);
+    }
+    let level = sheet.ground.level();
+    for vertex in &mut sheet.vertices {
+        vertex.height = (vertex.height + level).round() - level;
+    }
+    for triangle in 0..sheet.triangles.len() as u32 {
+        if sheet.is_live(triangle) {
+            sheet.settle(triangle);
+        }
+    }
+}
+
 /// Brings back the heights of vertices of which posts hardly tell anything: to those of their neighbours and of the
 /// ground where they stand, and a metre or a tenth of that range beyond. Among triangles smaller than posts are apart,
 /// beside features, a post near the foot of a triangle raised its top many times as far as it lay off itself.
-pub(crate) fn bind_loose_heights(sheet: &mut TileMesh) {
+fn bind_loose_heights(sheet: &mut TileMesh) {
     /// Squares of the shares that posts have in a height, below which it is loose.
     const LOOSE: f64 = 0.25;
     let live: Vec<u32> = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle)).collect();
@@ -115,4 +132,59 @@ fn bend(sheet: &TileMesh, live: &[u32], change: &[f64]) -> Vec<f64> {
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::optimiser::hold::Hold;
+    use crate::optimiser::parts::{Layout, Parts};
+    use crate::optimiser::place::Place;
+    use crate::optimiser::weighted_heights::WeightedHeights;
+    use terrain::{Dem, HeightFit, Importance, LatticePoint, PostRect, SeamSides, Tin, Vertex};
+
+    #[test]
+    fn a_height_of_which_posts_tell_nothing_is_bound_to_those_around_it() {
+        let rect = PostRect::of_size(9, 9);
+        // A cliff that lets heights range widely, far from a vertex whose triangles lie between posts.
+        let dem = Dem::from_fn(rect, |post| Some(if post.col < 3 { 9000 } else { 0 }));
+        let importance = Importance::uniform(rect, 1000);
+        let places = [(0, 0), (0, 64), (64, 64), (64, 0), (34, 34), (34, 38), (38, 36), (35, 36)];
+        let vertex = |(row, col): (i32, i32)| {
+            let height = if col < 24 { 9000 } else { 0 };
+            Vertex { at: LatticePoint::new(row, col), height }
+        };
+        let [sw, se, ne, nw, a, b, c, middle] = [0, 1, 2, 3, 4, 5, 6, 7];
+        let triangles = vec![
+            [sw, se, a],
+            [se, b, a],
+            [se, ne, b],
+            [ne, c, b],
+            [ne, nw, c],
+            [nw, a, c],
+            [nw, sw, a],
+            [a, b, middle],
+            [b, c, middle],
+            [c, a, middle],
+        ];
+        let start = Tin::new(rect, places.map(vertex).to_vec(), triangles);
+        let ground = WeightedHeights::new(&dem, (&importance, &importance), SeamSides::OPEN, HeightFit::Squares);
+        let layout = Layout { line_step: None, hold: &|_: Place| Hold::FREE };
+        let mut sheet = TileMesh::new(&ground, Parts::of(&ground, &start, &layout), None, true);
+        let number = |row: i32, col: i32| {
+            let at = Place::of(LatticePoint::new(row, col), rect, terrain::LATTICE_PER_POST);
+            sheet.vertices.iter().position(|vertex| vertex.at == at).unwrap()
+        };
+        let (loose, told) = (number(35, 36), number(34, 34));
+        let level = ground.level();
+        for vertex in [loose, told] {
+            sheet.vertices[vertex].height = 5000.0 - level;
+        }
+        bind_loose_heights(&mut sheet);
+        assert_eq!(sheet.vertices[told].height + level, 5000.0);
+        // Its neighbours' heights now range up to 5000, and a tenth beyond.
+        sheet.vertices[told].height = -level;
+        bind_loose_heights(&mut sheet);
+        assert_eq!(sheet.vertices[loose].height + level, f64::from(BEYOND_LEAST));
+    }
 }

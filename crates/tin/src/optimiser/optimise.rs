@@ -7,7 +7,7 @@ use crate::optimiser::account::Account;
 use crate::optimiser::deep_flips::deep_flips;
 use crate::optimiser::descent::descend;
 use crate::optimiser::flips::flip_all;
-use crate::optimiser::heights::fit_heights;
+use crate::optimiser::heights::{fit_heights, round_heights};
 use crate::optimiser::hold::Hold;
 use crate::optimiser::insertion::Insertion;
 use crate::optimiser::parts::{Layout, Parts};
@@ -59,7 +59,7 @@ pub fn optimise(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) ->
 pub fn fill(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) -> Optimised {
     work_on(dem, importance, start, task, |work| {
         work.fill_by_squares();
-        work.sheet.round_heights();
+        round_heights(&mut work.sheet);
     })
 }
 
@@ -71,7 +71,7 @@ pub fn weave_in(dem: &Dem, importance: &Importance, start: &Tin, task: &Task) ->
     work_on(dem, importance, start, task, |work| {
         work.thin_to_goal();
         work.meet_limits();
-        work.sheet.round_heights();
+        round_heights(&mut work.sheet);
     })
 }
 
@@ -128,7 +128,7 @@ impl Work<'_, '_> {
             self.check();
         }
         self.reach_goal();
-        self.sheet.round_heights();
+        round_heights(&mut self.sheet);
         self.meet_largest();
     }
 

@@ -3,7 +3,6 @@
 use terrain::{PostRect, Tin, Vertex as TinVertex};
 
 use crate::optimiser::form::Form;
-use crate::optimiser::heights::bind_loose_heights;
 use crate::optimiser::hold::Hold;
 use crate::optimiser::moments::Sums;
 use crate::optimiser::parts::{NONE, Parts, Vertex, line_hold};
@@ -334,22 +333,6 @@ impl<'a> TileMesh<'a> {
         }
         let live = self.triangles.iter().filter(|record| record.corners[0] != NONE);
         live.map(|record| self.ground.plain_squares(self.places(record.corners), self.heights(record.corners))).sum()
-    }
-
-    /// Rounds all heights to whole quanta, which is how they are kept; beside features those that are loose are bound.
-    pub fn round_heights(&mut self) {
-        if self.has_features {
-            bind_loose_heights(self);
-        }
-        let level = self.ground.level();
-        for vertex in &mut self.vertices {
-            vertex.height = (vertex.height + level).round() - level;
-        }
-        for triangle in 0..self.triangles.len() as u32 {
-            if self.is_live(triangle) {
-                self.settle(triangle);
-            }
-        }
     }
 
     pub fn mark_all_changed(&mut self) {
