@@ -3,13 +3,14 @@
 //!
 //! glTF has y up and right-handed axes, so x points east, y up and z south.
 
+use std::collections::BTreeMap;
 use std::io::{Result, Write};
 
 use serde_json::{Value, json};
 use terrain::{ModuleId, Tin, metres_of_quanta};
 
 use crate::classes::Classes;
-use crate::detail::{Detail, coverage, steps};
+use crate::detail::{Detail, Step, coverage, steps};
 use crate::glb_features::FoundFeatures;
 use crate::mesh::{Part, class_groups, normals};
 use crate::modules::{alone, sheet_name};
@@ -362,9 +363,12 @@ pub fn write_glb(out: &mut impl Write, product: &Product, mesh: &Mesh, texture: 
         };
         node.with_groups(&part.triangles, &part.classes)
     };
+    // Of all sheets of a load module.
+    let of_levels = |id: ModuleId| (id, steps(details.iter().map(|of| &of.product), alone(id)));
+    let all_steps: BTreeMap<ModuleId, Vec<Step>> = product.rect.iter().map(of_levels).collect();
     let of_module = |sheet: Sheet, id: ModuleId| {
         let (rect, name) = (alone(id), sheet_name(sheet, alone(id)));
-        let steps = steps(details.iter().map(|of| &of.product), rect);
+        let steps = &all_steps[&id];
         let coverage = |at: usize| steps.get(at + 1).map_or(0.0, |next| coverage(product.side_m(), next.near_m));
         let level = |(at, of): (usize, &Detail)| {
             let name = if at == 0 { name.clone() } else { format!("{name}_lod{}", of.product.level) };

@@ -431,6 +431,22 @@ mod tests {
     }
 
     #[test]
+    fn pieces_of_an_object_in_several_load_modules_have_its_height() {
+        let mut product = samples::with_objects();
+        let id = product.modules[1].objects.prisms[0].id;
+        let whole = |product: &Product| {
+            let mesh = Mesh::of(product);
+            let own = mesh.things.iter().filter(|(thing, _)| thing.kind == ObjectKind::Building && thing.id == id);
+            own.map(|(thing, _)| thing.height).collect::<Vec<i32>>()
+        };
+        let before = whole(&product);
+        assert_eq!(before, vec![before[0]; 2]);
+        // The ground lies lower there, and the piece begins lower.
+        product.modules[1].objects.prisms[0].base -= 640;
+        assert_eq!(whole(&product), vec![before[0] + 640; 2]);
+    }
+
+    #[test]
     fn triangles_over_holes_and_their_vertices_are_left_out() {
         let product = samples::with_hole();
         let whole = Mesh::whole(&product);

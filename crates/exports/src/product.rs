@@ -151,8 +151,8 @@ impl Product {
             product.modules.iter_mut().for_each(leave_out_over_holes);
             product.over_holes = count - product.object_count();
             // All levels have the same objects, wherever the holes of each end.
-            for (finest, coarser) in product.coarser.iter_mut().flat_map(|level| product.modules.iter().zip(level)) {
-                coarser.objects = finest.objects.clone();
+            for level in &mut product.coarser {
+                level.iter_mut().zip(&product.modules).for_each(|(own, finest)| own.objects = finest.objects.clone());
             }
         }
         Ok(product)
