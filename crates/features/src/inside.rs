@@ -27,7 +27,9 @@ pub(crate) const LINES_AT_ONCE: usize = 1024;
 impl Inside {
     /// Outlines of strips among all lines, after they were rounded together.
     pub fn new(lines: &[Strand], rounded: &[Vec<Place>]) -> Self {
-        let of_line = |line: &Strand| (line.class, line.role == Role::Side);
+        // A toe lies in no strip, whatever their classes.
+        let class = |line: &Strand| if line.role == Role::Toe { u16::MAX } else { line.class };
+        let of_line = |line: &Strand| (class(line), line.role == Role::Side);
         let mut inside = Self {
             rings: Vec::new(),
             cells: HashMap::new(),
