@@ -90,7 +90,8 @@ pub(crate) fn sound(area: &GamingArea, read: &ReadFeatures, tile: TileId, dem: &
     let inside = |(number, outline): (u32, &Outline)| {
         let rings: Vec<Vec<Vertex>> = outline.rings.iter().map(|ring| vertices(&ring.places)).collect();
         let rings: Vec<&[Vertex]> = rings.iter().map(Vec::as_slice).collect();
-        let mut heights: Vec<i32> = posts_inside(&rings, steps, own).into_iter().map(|post| dem.height(post)).collect();
+        let posts = posts_inside(&rings, steps, own).into_iter().filter(|post| !dem.is_void(*post));
+        let mut heights: Vec<i32> = posts.map(|post| dem.height(post)).collect();
         heights.sort_unstable();
         let histogram = heights.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32));
         (!heights.is_empty()).then(|| (number, histogram.collect()))
@@ -122,20 +123,22 @@ fn own_posts(tile: PostRect, area: PostRect) -> PostRect {
     PostRect { north, east, ..tile }
 }
 
-/// The middle one of the heights at the post nearest to a place and the eight around it, as far as the DEM reaches.
-fn middle_at(dem: &Dem, steps: i32, place: Place) -> i32 {
+/// The middle one of the heights at the post nearest to a place and the eight around it, as far as the DEM reaches and
+/// has no hole; nothing where the nearest lies in one.
+fn middle_at(dem: &Dem, steps: i32, place: Place) -> Option<i32> {
     let PostRect { south, west, north, east } = dem.rect();
     let near = |at: i32, low: i32, high: i32| {
         let post = (2 * at + steps).div_euclid(2 * steps);
-        (-1..=1).map(move |by| (post + by).clamp(low, high))
+        [-1, 0, 1].map(|by| (post + by).clamp(low, high))
     };
-    let rows = near(place.row, south, north);
-    let mut heights: Vec<i32> = rows
-        .flat_map(|row| near(place.col, west, east).map(move |col| Post::new(row, col)))
-        .map(|post| dem.height(post))
-        .collect();
+    let (rows, cols) = (near(place.row, south, north), near(place.col, west, east));
+    if dem.is_void(Post::new(rows[1], cols[1])) {
+        return None;
+    }
+    let posts = rows.into_iter().flat_map(|row| cols.map(|col| Post::new(row, col)));
+    let mut heights: Vec<i32> = posts.filter(|post| !dem.is_void(*post)).map(|post| dem.height(post)).collect();
     heights.sort_unstable();
-    heights[heights.len() / 2]
+    Some(heights[heights.len() / 2])
 }
 
 /// The height of a DEM at a place between its posts, bilinear and rounded to quanta: over a hole that of the surface
@@ -172,6 +175,8 @@ mod tests {
         assert_eq!((at(0, 0), at(64, 32), at(32, 32), at(1, 0)), (0, 105, 55, 2));
         // The last post of a row needs none beyond it.
         assert_eq!((at(0, 128), at(32, 128), at(128, 64), at(128, 96)), (20, 70, 210, 255));
+        let middle = |row, col| middle_at(&dem, 64, Place::new(row, col));
+        assert_eq!((middle(64, 64), middle(100, 100), middle(0, 0)), (Some(110), None, Some(10)));
         assert_eq!((at(-70, -1), at(32, 999), at(-5, 32)), (0, 70, 5), "beyond it the nearest height counts");
     }
 }

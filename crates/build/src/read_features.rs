@@ -102,7 +102,7 @@ impl Heard {
         for (profile, stations) in profiles.zip(&read.by_tile) {
             stations.iter().zip(&profile.heights).for_each(|(&station, &height)| heights[station as usize] = height);
             let ways = stations.iter().filter(|station| is_way[**station as usize]);
-            ways.zip(&profile.middles).for_each(|(&station, &height)| middles[station as usize] = Some(height));
+            ways.zip(&profile.middles).for_each(|(&station, &height)| middles[station as usize] = height);
             for (outline, of) in &profile.inside {
                 let Some(inside) = inside.get_mut(*outline as usize) else { continue };
                 inside.extend(of);

@@ -362,7 +362,8 @@ fn length_m(lines: &[Vec<ModuleLine>]) -> f64 {
     all.map(part).sum::<f64>() / f64::from(QUANTA_PER_METRE)
 }
 
-/// Leaves out buildings and parts of woods all of which stand over holes, where nothing is known of the ground.
+/// Leaves out buildings of which more than half stands over holes, where nothing is known of the ground, and triangles
+/// of woods whose middle does.
 fn leave_out_over_holes(module: &mut LoadModule) {
     let LoadModule { vertices, triangles, classes, objects, .. } = module;
     let corner = |v: u16| [vertices[usize::from(v)].x, vertices[usize::from(v)].y].map(i64::from);
@@ -379,7 +380,14 @@ fn leave_out_over_holes(module: &mut LoadModule) {
     objects.prisms.retain(|prism| {
         let (places, triangles) = plans::triangles(&prism.plan());
         let at = |index: u32| places[index as usize].map(i64::from);
-        triangles.is_empty() || !triangles.iter().all(|triangle| stands_over(triangle.map(at)))
+        // Twice the areas of its triangles: those over holes against the others.
+        let weigh = |triangle: &[u32; 3]| {
+            let corners = triangle.map(at);
+            let [[ax, ay], [bx, by], [cx, cy]] = corners;
+            let area = ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)).abs();
+            if stands_over(corners) { area } else { -area }
+        };
+        triangles.iter().map(weigh).sum::<i64>() <= 0
     });
     for canopy in &mut objects.canopies {
         let at = |index: u16| canopy.places[usize::from(index)].map(i64::from);

@@ -48,7 +48,8 @@ pub struct AreaFeatures {
 pub struct Sounded<'a> {
     /// Its height at each of the [`AreaFeatures::stations`], in quanta.
     pub heights: &'a [Option<i32>],
-    /// The middle one of nine heights around each station that is a [`AreaFeatures::is_way`].
+    /// The middle one of nine heights around each station that is a [`AreaFeatures::is_way`]; none over a hole of the
+    /// DEM, where heights are made up.
     pub middles: &'a [Option<i32>],
     /// Heights of the posts inside each of the [`AreaFeatures::outlines`].
     pub inside: &'a [Histogram],
@@ -233,7 +234,8 @@ impl AreaFeatures {
         let beside_water = |place: Place, height: i32| drawn.ground(place.into(), height);
         let at = |place: Place| natural(place).map(|height| beside_water(place, height));
         let middle = |place: Place| middle(place).map(|height| beside_water(place, height));
-        let resting = ground_of(&self.roads, &at, &near);
+        let known = |place: Place| middle(place).and(at(place));
+        let resting = ground_of(&self.roads, &known, &near);
         let mut hills = under_hills(&self.roads, &resting, options.cut_max);
         let roads = &*self.roads.with_tunnels(&hills);
         let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
@@ -264,6 +266,7 @@ impl AreaFeatures {
         let roadsides = roadsides(&reserved.formed, &graded, (&resting, &self.road_sides));
         let earthworks = earthworks(&Laid {
             ground: &natural,
+            is_known: &|place| middle(place).is_some(),
             site: &self.site,
             roads: Graded { grants: &reserved.grants, ..graded },
             pins: &pins,
@@ -291,12 +294,13 @@ impl AreaFeatures {
         };
         let shores: Vec<Vec<Option<i32>>> = outlines.iter().map(shore_of).collect();
         let has_line = have_line(outlines, rivers, site);
+        let known = |place: Place| middle(place).and(at(place));
         let is_dam = |place: Place| self.dams.contains(&place);
         let all = Shores { heights: &shores, inside, has_line: &has_line };
         let mut waters: Waters = level(outlines, all, &is_dam, falls, site.lattice, remarks);
-        let ground = ground_of(rivers, at, near);
+        let ground = ground_of(rivers, &known, near);
         let lowest = |(banks, ground): (&[Place; 2], &Option<i32>)| {
-            banks.iter().filter_map(|place| at(*place)).chain(*ground).min()
+            ground.and_then(|ground| banks.iter().filter_map(|place| at(*place)).chain([ground]).min())
         };
         let lower_bank: Vec<Option<i32>> = self.river_banks.iter().zip(&ground).map(lowest).collect();
         let middles: Vec<Option<i32>> =
@@ -360,7 +364,7 @@ struct Soundings<'a> {
     inside: &'a [Histogram],
 }
 
-/// The ground inside the area at each node of a network; what has no part inside rests on the ground nearest to it.
+/// The ground that is known at each node of a network; what has no part of it rests on the nearest ground there is.
 fn ground_of(network: &Network, at: Ground, near: Ground) -> Vec<Option<i32>> {
     let place = |node: u32| network.nodes[node as usize].place;
     let mut ground: Vec<Option<i32>> = network.nodes.iter().map(|node| at(node.place)).collect();

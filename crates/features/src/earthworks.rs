@@ -66,6 +66,8 @@ pub struct Earthworks {
 pub(crate) struct Laid<'a> {
     /// The height of the ground inside the area.
     pub ground: &'a dyn Fn(Place) -> Option<i32>,
+    /// Whether that is the ground at a station of a way, and not what closes a hole.
+    pub is_known: &'a dyn Fn(Place) -> bool,
     pub site: &'a Site,
     /// Roads, with what is granted to each.
     pub roads: Graded<'a>,
@@ -165,22 +167,19 @@ impl Sums<'_> {
     }
 
     fn add(&mut self, piece: &Piece) {
-        let Laid { site, ground, level, .. } = *self.laid;
+        let Laid { site, ground, is_known, level, .. } = *self.laid;
         let [Some(a), Some(b)] = piece.ends.map(ground) else { return };
         if !site.holds_middle(piece.ends[0], piece.ends[1]) {
             return;
         }
-        let off = [piece.heights[0] - a, piece.heights[1] - b];
+        let is_known = piece.ends.into_iter().all(is_known);
+        let off = if is_known { [piece.heights[0] - a, piece.heights[1] - b] } else { [0, 0] };
         let length = metres_of_quanta(site.lattice.length(piece.ends[0], piece.ends[1]) as i32);
         let work = self.found.classes.entry(piece.class).or_default();
         work.length_m += length;
         let mut moved = [0.0; 2];
         for off in off {
-            count_off(work, off, length / 2.0);
-            for (over, times) in work.over_limit_m.iter_mut().zip([1, 2]) {
-                let is_over = off < -times * piece.limits[0] || times * piece.limits[1] < off;
-                *over += if is_over { length / 2.0 } else { 0.0 };
-            }
+            count_off(work, off, length / 2.0, piece.limits);
             let (metres, width) = (metres_of_quanta(off.abs()), metres_of_quanta(piece.width));
             moved[usize::from(0 < off)] += (width * metres + SLOPES * metres * metres) * length / 2.0;
         }
@@ -199,7 +198,7 @@ impl Sums<'_> {
 
     /// Lakes: what lies above and below the level inside, and how far the shore does.
     fn lakes(&mut self) {
-        let Laid { site, ground, outlines, lakes, strands, roads, inside, .. } = *self.laid;
+        let Laid { site, ground, outlines, lakes, strands, roads, inside, limits, .. } = *self.laid;
         let kept: BTreeSet<FeatureId> = strands
             .iter()
             .enumerate()
@@ -223,8 +222,8 @@ impl Sums<'_> {
                     let Some(ground) = ground(*place).filter(|_| site.holds_middle(*place, *next)) else { continue };
                     let work = self.found.classes.entry(class).or_default();
                     work.length_m += length;
-                    count_off(work, lake.level - ground, length);
                     let off = lake.level - ground;
+                    count_off(work, off, length, [limits.1.cut_max, limits.1.fill_max]);
                     let far = FarOff { class, id: outline.id, place: *place, off, cause: OffCause::Level };
                     self.tell(site.module_of(*place), far, None);
                 }
@@ -253,8 +252,12 @@ impl Sums<'_> {
     }
 }
 
-/// Counts a length by how far it lies off the ground, in quanta.
-fn count_off(work: &mut Earthwork, off: i32, length: f64) {
+/// Counts a length by how far it lies off the ground, in quanta, and by the limits of cut and fill.
+fn count_off(work: &mut Earthwork, off: i32, length: f64, [cut_max, fill_max]: [i32; 2]) {
+    for (over, times) in work.over_limit_m.iter_mut().zip([1, 2]) {
+        let is_over = off < -times * cut_max || times * fill_max < off;
+        *over += if is_over { length } else { 0.0 };
+    }
     for (off_m, far_m) in work.off_m.iter_mut().zip(OFF_M) {
         *off_m += if far_m * QUANTA_PER_METRE < off.abs() { length } else { 0.0 };
     }
@@ -371,6 +374,7 @@ mod tests {
         let laid = |pins, afloat| {
             Laid {
                 ground: &|_| None,
+                is_known: &|_| true,
                 site: &site,
                 roads: Graded { network: &network, heights: &heights, beside: &[], grants: &grants },
                 pins,

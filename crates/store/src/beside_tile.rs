@@ -40,8 +40,9 @@ pub struct Profile {
     pub tile: TileId,
     /// Its height at each of their stations, in the order of places, in quanta; nothing over a void.
     pub heights: Vec<Option<i32>>,
-    /// The middle one of nine heights around each of those stations through which a way runs, in quanta.
-    pub middles: Vec<i32>,
+    /// The middle one of nine heights around each of those stations through which a way runs, in quanta; nothing over a
+    /// hole.
+    pub middles: Vec<Option<i32>>,
     /// Of polygons of water by their number: how often each height occurs at the posts inside, in quanta, ascending.
     pub inside: Vec<(u32, Vec<(i32, u32)>)>,
 }
@@ -136,7 +137,7 @@ mod tests {
         let path = Path::new("r00c01.profile");
         let heights = vec![Some(-7), None, Some(90_000)];
         let inside = vec![(2, vec![(-7, 3), (12, 1)])];
-        let profile = Profile { tile: samples::TILE, heights, middles: vec![9, -9], inside };
+        let profile = Profile { tile: samples::TILE, heights, middles: vec![Some(9), None], inside };
         let bytes = encode_profile(&samples::stamp(), &profile);
         assert_eq!(decode_profile(path, &bytes).unwrap(), (samples::stamp(), profile));
         samples::check_every_damage(&bytes, |bytes| decode_profile(path, bytes).is_err());

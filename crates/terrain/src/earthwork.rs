@@ -76,7 +76,7 @@ pub struct Earthwork {
     pub length_m: f64,
     /// Metres of them that lie more than 3, 5, 10 and 20 m off the ground.
     pub off_m: [f64; 4],
-    /// Metres of ways that lie farther off than the limits of cut and fill, and than twice these.
+    /// Metres of these that lie farther off than the limits of cut and fill, and than twice these.
     pub over_limit_m: [f64; 2],
     /// Cubic metres cut and filled.
     pub moved_m3: [f64; 2],

@@ -16,10 +16,15 @@ pub fn place(text: &str) -> Result<[f64; 2], String> {
     numbers(text).ok_or_else(|| "expected EAST,NORTH in metres, such as 521000,3893000".into())
 }
 
+/// Metres above the ground that anything may be at most.
+pub const ABOVE_M_MAX: f64 = 1e6;
+
 /// Reads `E,N,H`: an easting, a northing and metres above the ground.
 pub fn place_above(text: &str) -> Result<[f64; 3], String> {
     match numbers(text) {
-        Some([_, _, above]) if above < 0.0 => Err("expected 0 or more metres above the ground".into()),
+        Some([_, _, above]) if !(0.0..=ABOVE_M_MAX).contains(&above) => {
+            Err("expected 0 to 1000000 metres above the ground".into())
+        }
         Some(place) => Ok(place),
         None => {
             Err("expected EAST,NORTH,ABOVE in metres, the last above the ground, such as 521000,3893000,2.5".into())

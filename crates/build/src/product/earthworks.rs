@@ -51,7 +51,7 @@ pub(crate) fn earthworks(names: &[String], level: &AreaLevel) -> ReportEarthwork
     ReportEarthworks { classes: level.earthworks.iter().map(class).collect(), worst: worst.map(far).collect() }
 }
 
-/// What a person should know of ways that lie farther off the ground than cut and fill may be.
+/// What a person should know of ways and shores that lie farther off the ground than cut and fill may be.
 pub(crate) fn warnings(names: &[String], level: &AreaLevel) -> Vec<String> {
     let over = level.earthworks.iter().filter_map(|(class, work)| {
         let is_too_much = |at: usize| {

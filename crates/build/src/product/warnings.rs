@@ -5,6 +5,8 @@
 //! what sound data do not have: `--strict` ends with an error for each. Warnings about sources come from the stages
 //! that read them; the guide lists all in one table.
 
+use std::collections::BTreeSet;
+
 use job::Job;
 use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance};
 
@@ -44,7 +46,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 19] = [
+pub(crate) const MATTERS: [Matter; 20] = [
     matter(
         "files, datums, holes and rules of sources, or metres of the area's system, that are not as they should be",
         Told::OfStage,
@@ -62,7 +64,7 @@ pub(crate) const MATTERS: [Matter; 19] = [
         "lines of sight go where buildings or woods stand; larger limits keep them, as tiefort plan tells",
     ),
     matter(
-        "more than 5 % of a class of ways, and 100 m, beyond the limits of cut and fill, or 1 % beyond twice these",
+        "more than 5 % of a class of ways or of shores, and 100 m, beyond the limits of cut and fill, or 1 % beyond twice these",
         Told::Warning(earthworks),
         "they lie where no person believes them; less than that is listed with its cause",
     ),
@@ -96,6 +98,11 @@ pub(crate) const MATTERS: [Matter; 19] = [
         "decks too low over what they cross",
         Told::Line,
         "each is listed in features.geojson, and the report has the least height over each class",
+    ),
+    matter(
+        "polygons of rivers without a line in them that fall too far for a lake",
+        Told::Warning(rivers_without_line),
+        "nothing says which way they fall: they are outlines in the ground, and no water",
     ),
     matter("grades that were relaxed", Told::Line, "the surface is drivable, and each is listed in features.geojson"),
     matter(
@@ -172,6 +179,22 @@ fn decks_below(made: &Made) -> Vec<String> {
         format!("a deck lies {:.2} m below what it crosses of {}, see features.geojson", -over.least_m, over.class)
     };
     below.map(told).collect()
+}
+
+/// Polygons of rivers are outlines only.
+fn rivers_without_line(made: &Made) -> Vec<String> {
+    let outline_only = features::Remedy::OutlineOnly.to_string();
+    let remarks = made.features.iter().flat_map(|(_, level)| &level.remarks);
+    let rivers: BTreeSet<&str> =
+        remarks.filter(|remark| remark.done == outline_only).map(|remark| remark.feature.as_str()).collect();
+    let told = || {
+        format!(
+            "{} polygons of rivers have no line inside and fall too far for a lake: they are breaklines and no water, \
+             see features.geojson; lines of the rivers beside them make them water",
+            rivers.len()
+        )
+    };
+    (!rivers.is_empty()).then(told).into_iter().collect()
 }
 
 /// Bridges would run through hills.

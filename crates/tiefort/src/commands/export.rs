@@ -343,7 +343,10 @@ fn prepared(arguments: &Arguments, database: &Path, work: &Work) -> Result<Produ
 /// What materials are called: as the job says, and before that as the arguments say.
 fn materials(arguments: &Arguments, database: &Path, product: &Product) -> Result<Vec<MaterialName>, Failure> {
     let mut materials = Job::from_text(&product.manifest.job, database)?.materials;
-    for (of, name) in arguments.materials.iter().cloned() {
+    for (at, (of, name)) in arguments.materials.iter().cloned().enumerate() {
+        if arguments.materials[..at].iter().any(|(before, _)| *before == of) {
+            return Err(Failure::new(format!("found --material {of}=… twice"), "give each material one name"));
+        }
         match materials.iter_mut().find(|named| named.of == of) {
             Some(named) => named.name = name,
             None => materials.push(MaterialName { of, name, ..MaterialName::default() }),

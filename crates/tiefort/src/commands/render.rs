@@ -107,6 +107,10 @@ const SURFACES: [(&str, Shown, &str); 3] = [
 /// Draws.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     refuse_flags_without_use(arguments)?;
+    if !["", "png"].contains(&files::extension(&arguments.out).as_str()) {
+        let message = format!("found --out {}, expected a name that ends in .png", arguments.out.display());
+        return Err(Failure::new(message, "pictures are PNG files"));
+    }
     files::check_writable(&arguments.out)?;
     // Windows reach beyond any part, and a tile's triangles are counted whole.
     let reads_all = matches!(arguments.view, View::Density | View::Limits | View::Tiles);

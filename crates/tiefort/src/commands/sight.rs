@@ -31,7 +31,8 @@ are looked at, a second band tells the per cent of the light that they leave.
 Heights of both ends are metres above the ground. Decks of bridges hide what is
 behind them, as ground does, and so do buildings and walls where the database
 has some ([objects] of its job); woods take light away, and what less than half
-of it reaches is hidden. --objects none leaves all of that out.
+of it reaches is hidden. --objects none leaves all of that out. Over holes of
+the DEM the ground is the surface that closes them.
 
 Exit codes: 0, whatever is seen; 2 for what cannot be looked at.";
 
@@ -60,7 +61,7 @@ pub struct Arguments {
     #[arg(long, value_name = "KM", value_parser = positive, requires = "out")]
     range: Option<f64>,
     /// Metres above the ground of what it looks at [default: 0]
-    #[arg(long, value_name = "M", value_parser = not_negative)]
+    #[arg(long, value_name = "M", value_parser = above_ground)]
     target: Option<f64>,
     /// Metres between places that it looks at, a multiple of 1/16 m [default: 25]
     #[arg(long, value_name = "M", value_parser = positive)]
@@ -85,10 +86,10 @@ pub struct Arguments {
     workers: arguments::Workers,
 }
 
-fn not_negative(text: &str) -> Result<f64, String> {
+fn above_ground(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(number) if number.is_finite() && 0.0 <= number => Ok(number),
-        _ => Err("expected 0 or a number above it".into()),
+        Ok(number) if (0.0..=places::ABOVE_M_MAX).contains(&number) => Ok(number),
+        _ => Err("expected 0 to 1000000".into()),
     }
 }
 
@@ -160,8 +161,23 @@ fn line(arguments: &Arguments, area: &Area, to: [f64; 3], curvature: Curvature) 
         let (metres, left) = (sighting.wood_m, 100.0 * sighting.transmission);
         text += &format!("woods      {metres:.1} m inside, which leave {left:.0} % of the light\n");
     }
+    let at = |part: f64| [0, 1].map(|axis| from[axis] + part * run[axis]);
+    let hider = if let Sight::Hidden(part) = sighting.sight { Some(("what hides it", at(part))) } else { None };
+    for (what, place_m) in [("the eye", at(0.0)), ("the target", at(1.0))].into_iter().chain(hider) {
+        text += &over_hole(what, place_m, &ground);
+    }
     terminal::print(&text)?;
     Ok(Outcome::Sound)
+}
+
+/// A line for what lies over a hole of the DEM.
+fn over_hole(what: &str, place_m: [f64; 2], ground: &LoadedGround) -> String {
+    let is_over = ground.sample(place_m).is_some_and(|sample| sample.class == terrain::HOLE_CLASS);
+    if is_over {
+        format!("note       {what} lies over a hole of the DEM, the ground of which is made up\n")
+    } else {
+        String::new()
+    }
 }
 
 /// What is written.
@@ -222,7 +238,7 @@ fn around(
         Kind::Tiff => write_tiff(&looks, spacing, out)?,
         Kind::Png => write_png(&looks, out)?,
     };
-    terminal::print(&told(&looks, &seen, out))?;
+    terminal::print(&(told(&looks, &seen, out) + &over_hole("the eye", [east, north], &ground)))?;
     Ok(Outcome::Sound)
 }
 
