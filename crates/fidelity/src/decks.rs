@@ -15,6 +15,15 @@ const APART: f64 = 3840.0;
 /// Quanta that a deck may lie under the ground on which it rests: 5 cm, which is what raising its corners leaves.
 const ROUNDING: i32 = 6;
 
+/// How far from an end of a bridge's line the corners of its deck there are at most, as a part of its width.
+const END_PART: f64 = 0.75;
+
+/// How far corners there may lie along the bridge at most, as a part of how far they lie from its end.
+const ALONG_MAX: f64 = 0.5;
+
+/// Quanta that the line of a bridge lies off the ground at most where the bridge ends on it: 25 cm.
+const ON_GROUND: f64 = 32.0;
+
 /// What lies under decks, a place in every square metre.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeckFigures {
@@ -28,6 +37,17 @@ pub struct DeckFigures {
     /// middle lines cross, or run below the deck 30 m and more from where bridges end, above level ground of a class
     /// that has no middle line, such as lakes, anywhere.
     pub clearance: BTreeMap<u8, i32>,
+    /// The highest step onto a deck.
+    pub step: DeckStep,
+}
+
+/// How far a corner of a deck stands above the end of its bridge's line, where that ends on the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct DeckStep {
+    /// Quanta.
+    pub rise: u32,
+    /// Where: quanta east and north of the area's south-west corner.
+    pub place: [u64; 2],
 }
 
 impl DeckFigures {
@@ -52,6 +72,7 @@ impl DeckFigures {
         for (class, height) in crossed(&module.lines).into_iter().chain(passed(module)) {
             figures.add_clearance(class, height);
         }
+        figures.step = highest_step(module);
         for under in above.into_iter().map(|above| -above.floor() as i32).filter(|under| ROUNDING < *under) {
             figures.under += 1;
             figures.deepest = figures.deepest.max(under.unsigned_abs());
@@ -64,6 +85,7 @@ impl DeckFigures {
         self.samples += other.samples;
         self.under += other.under;
         self.deepest = self.deepest.max(other.deepest);
+        self.step = self.step.max(other.step);
         other.clearance.iter().for_each(|(&class, &least)| self.add_clearance(class, least));
     }
 
@@ -106,6 +128,44 @@ fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
         }
     }
     found
+}
+
+/// The highest step onto a deck: of corners beside an end of a bridge's line, where that ends on the ground.
+fn highest_step(module: &LoadModule) -> DeckStep {
+    let is_inside = |vertex: &ModuleVertex| [vertex.x, vertex.y].iter().all(|at| (1..module.side).contains(at));
+    let run = |a: &ModuleVertex, b: &ModuleVertex| [f64::from(b.x) - f64::from(a.x), f64::from(b.y) - f64::from(a.y)];
+    let mut highest = DeckStep::default();
+    for line in module.lines.iter().filter(|line| line.traits.storey == LineStorey::Bridge && line.traits.is_kept) {
+        let reach = END_PART * f64::from(line.traits.width);
+        let [.., before_last, last] = &line.vertices[..] else { continue };
+        for [end, next] in [[&line.vertices[0], &line.vertices[1]], [last, before_last]] {
+            if !is_inside(end) || ON_GROUND < (ground_under(module, end) - f64::from(end.z)).abs() {
+                continue;
+            }
+            let [east, north] = run(end, next);
+            let is_across = |corner: &&ModuleVertex| {
+                let [x, y] = run(end, corner);
+                let apart = x.hypot(y);
+                apart <= reach && (x * east + y * north).abs() <= ALONG_MAX * apart * east.hypot(north)
+            };
+            for corner in module.decks.vertices.iter().filter(|corner| is_inside(corner)).filter(is_across) {
+                let place = [(module.id.col, corner.x), (module.id.row, corner.y)]
+                    .map(|(number, at)| u64::from(number) * u64::from(module.side) + u64::from(at));
+                highest = highest.max(DeckStep { rise: (corner.z - end.z).max(0).unsigned_abs(), place });
+            }
+        }
+    }
+    highest
+}
+
+/// The highest that the ground is under a vertex, in quanta.
+fn ground_under(module: &LoadModule, vertex: &ModuleVertex) -> f64 {
+    let place = [f64::from(vertex.x), f64::from(vertex.y)];
+    let ground = module.triangles.iter().filter_map(|triangle| {
+        let corners = triangle.map(|corner| module.vertices[usize::from(corner)]);
+        height_in(corners.map(|corner| [f64::from(corner.x), f64::from(corner.y), f64::from(corner.z)]), place)
+    });
+    ground.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Whether a line is one that bridges pass over.

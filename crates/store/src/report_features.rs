@@ -173,6 +173,12 @@ pub struct ReportFeatureChecks {
     /// How far it does at most, in metres.
     #[serde(default)]
     pub deck_under_max_m: f64,
+    /// How far a corner of a deck stands above the road at most where its bridge ends on the ground, in metres.
+    #[serde(default)]
+    pub deck_step_max_m: f64,
+    /// Where: easting and northing in metres.
+    #[serde(default)]
+    pub deck_step_at_m: [f64; 2],
 }
 
 /// How low decks pass over one class of ways or water.

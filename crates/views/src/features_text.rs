@@ -135,6 +135,7 @@ pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, Str
         ("banks of roads inside shores", format!("{} m2", grouped(checks.lake_banks_m2))),
         ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
         ("square metres of decks under ground", under_ground(checks)),
+        ("highest step onto a deck", format!("{:.2} m", checks.deck_step_max_m)),
         (
             "residual outside features",
             format!("RMS {:.3} m, largest {:.2} m", checks.outside_rms_m, checks.outside_max_m),

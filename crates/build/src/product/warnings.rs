@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use job::Job;
-use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance};
+use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance, ReportFeatureChecks};
 
 use crate::product::earthworks;
 
@@ -46,7 +46,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 20] = [
+pub(crate) const MATTERS: [Matter; 21] = [
     matter(
         "files, datums, holes and rules of sources, or metres of the area's system, that are not as they should be",
         Told::OfStage,
@@ -83,6 +83,11 @@ pub(crate) const MATTERS: [Matter; 20] = [
         "decks under the ground",
         Told::Warning(decks_under),
         "corners of decks rise onto it as far as they can; vehicles would run into the ground",
+    ),
+    matter(
+        "a step of more than half a metre onto a deck",
+        Told::Warning(deck_steps),
+        "ground beside the bridge is higher there, and its corners rise onto that; vehicles would meet the step",
     ),
     matter(
         "bridges through ground that is higher",
@@ -171,6 +176,20 @@ fn decks_under(made: &Made) -> Vec<String> {
     (0 < checks.deck_samples_under).then(told).into_iter().collect()
 }
 
+/// A corner of a deck stands well above the road that leads onto it.
+fn deck_steps(made: &Made) -> Vec<String> {
+    const STEP_MAX_M: f64 = 0.5;
+    let checks = made.report.features.iter().map(|features| &features.checks);
+    let told = |checks: &ReportFeatureChecks| {
+        let ([east, north], step_m) = (checks.deck_step_at_m, checks.deck_step_max_m);
+        format!(
+            "a deck begins up to {step_m:.2} m above the road that leads onto it, most at {east:.1} {north:.1}, where \
+             ground beside it is higher"
+        )
+    };
+    checks.filter(|checks| STEP_MAX_M < checks.deck_step_max_m).map(told).collect()
+}
+
 /// Bridges lie lower than the ways and the water that they cross.
 fn decks_below(made: &Made) -> Vec<String> {
     let all = made.report.features.iter().flat_map(|features| &features.deck_clearances);
@@ -189,8 +208,8 @@ fn rivers_without_line(made: &Made) -> Vec<String> {
         remarks.filter(|remark| remark.done == outline_only).map(|remark| remark.feature.as_str()).collect();
     let told = || {
         format!(
-            "{} polygons of rivers have no line inside and fall too far for a lake: they are breaklines and no water, \
-             see features.geojson; lines of the rivers beside them make them water",
+            "polygons of rivers without a line inside that fall too far for a lake: {}; they are breaklines and no \
+             water, see features.geojson, and lines of the rivers beside them make them water",
             rivers.len()
         )
     };
@@ -284,7 +303,7 @@ fn beyond_sources(made: &Made) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use store::{ReportFeatureChecks, ReportFeatures, ReportHeights};
+    use store::{ReportFeatures, ReportHeights};
 
     use super::*;
 

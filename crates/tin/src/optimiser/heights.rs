@@ -57,12 +57,12 @@ pub(crate) fn round_heights(sheet: &mut TileMesh) {
     }
 }
 
-/// Brings back the heights of vertices of which posts hardly tell anything: to those of their neighbours and of the
-/// ground where they stand, and a metre or a tenth of that range beyond. Among triangles smaller than posts are apart,
-/// beside features, a post near the foot of a triangle raised its top many times as far as it lay off itself.
+/// Brings back the heights of vertices of which posts tell less than one does where it stands: to those of their
+/// neighbours and of the ground there, and a metre or a tenth of that range beyond. Among triangles smaller than posts
+/// are apart, beside features, a post near the foot of a triangle raised its top many times as far as it lay off itself.
 fn bind_loose_heights(sheet: &mut TileMesh) {
     /// Squares of the shares that posts have in a height, below which it is loose.
-    const LOOSE: f64 = 0.25;
+    const LOOSE: f64 = 1.0;
     let live: Vec<u32> = (0..sheet.triangles.len() as u32).filter(|&triangle| sheet.is_live(triangle)).collect();
     let mut told = vec![0.0; sheet.vertices.len()];
     let mut ends = vec![[f64::INFINITY, f64::NEG_INFINITY]; sheet.vertices.len()];
