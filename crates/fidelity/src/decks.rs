@@ -41,7 +41,8 @@ pub struct DeckFigures {
     pub step: DeckStep,
 }
 
-/// How far a corner of a deck stands above the end of its bridge's line, where that ends on the ground.
+/// How far a corner of a deck stands above the end of its bridge's line, where that ends on the ground, and above the
+/// ground under it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DeckStep {
     /// Quanta.
@@ -151,7 +152,9 @@ fn highest_step(module: &LoadModule) -> DeckStep {
             for corner in module.decks.vertices.iter().filter(|corner| is_inside(corner)).filter(is_across) {
                 let place = [(module.id.col, corner.x), (module.id.row, corner.y)]
                     .map(|(number, at)| u64::from(number) * u64::from(module.side) + u64::from(at));
-                highest = highest.max(DeckStep { rise: (corner.z - end.z).max(0).unsigned_abs(), place });
+                // Where a way is a line, the ground beside it may rise as far.
+                let road = ground_under(module, corner).max(f64::from(end.z));
+                highest = highest.max(DeckStep { rise: (f64::from(corner.z) - road).max(0.0) as u32, place });
             }
         }
     }

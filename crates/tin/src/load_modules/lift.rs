@@ -30,6 +30,10 @@ const SHARE_MIN_FREE: f64 = 0.1;
 /// The same at last, when no corner can be added: a deck that rises steeply is better than one in the ground.
 const SHARE_MIN_LAST: f64 = 0.3;
 
+/// Quanta that a corner at an end of a deck may rise above the ground there, where no corner can be added: half a metre,
+/// which a vehicle climbs.
+const STEP_MAX: f64 = 64.0;
+
 /// How often all places are gone through at most where no corner can be added.
 const LAST_TIMES: usize = 4;
 
@@ -245,7 +249,10 @@ impl<'a> Lift<'a> {
         let is_free: Vec<bool> = self.decks.vertices.iter().map(|vertex| free.contains(&place(*vertex))).collect();
         let most = |at: usize| match (self.are_inside[at], self.ends[at]) {
             (false, _) => self.heights[at],
-            (_, Some(ground)) if !is_free[at] => self.heights[at].max(ground - ROUNDING),
+            (_, Some(ground)) => {
+                let step = if is_free[at] { STEP_MAX } else { 0.0 };
+                self.heights[at].max(ground - ROUNDING + step)
+            }
             _ => self.cap(at, self.top),
         };
         let share = |is_free: &bool| if *is_free { SHARE_MIN_FREE } else { SHARE_MIN };
@@ -264,6 +271,9 @@ impl<'a> Lift<'a> {
             for corner in corners.into_iter().filter(|corner| self.are_inside[*corner]) {
                 most[corner] = most[corner].max(self.heights[corner] + rise);
             }
+        }
+        for ((most, height), ground) in most.iter_mut().zip(&self.heights).zip(&self.ends) {
+            *most = ground.map_or(*most, |ground| most.min(height.max(ground - ROUNDING + STEP_MAX)));
         }
         Bounds { share_min: vec![SHARE_MIN_LAST; most.len()], most }
     }
