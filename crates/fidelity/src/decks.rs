@@ -131,34 +131,46 @@ fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
     found
 }
 
-/// The highest step onto a deck: of corners beside an end of a bridge's line, where that ends on the ground.
+/// The highest step onto a deck: of corners beside an end of a bridge's line, where that ends on the ground. One beside
+/// several ends belongs to that from which it rises least.
 fn highest_step(module: &LoadModule) -> DeckStep {
     let is_inside = |vertex: &ModuleVertex| [vertex.x, vertex.y].iter().all(|at| (1..module.side).contains(at));
-    let run = |a: &ModuleVertex, b: &ModuleVertex| [f64::from(b.x) - f64::from(a.x), f64::from(b.y) - f64::from(a.y)];
-    let mut highest = DeckStep::default();
-    for line in module.lines.iter().filter(|line| line.traits.storey == LineStorey::Bridge && line.traits.is_kept) {
+    let is_bridge = |line: &&ModuleLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
+    let ends = |line: &ModuleLine| -> Vec<End> {
+        let [.., before_last, last] = line.vertices[..] else { return Vec::new() };
         let reach = END_PART * f64::from(line.traits.width);
-        let [.., before_last, last] = &line.vertices[..] else { continue };
-        for [end, next] in [[&line.vertices[0], &line.vertices[1]], [last, before_last]] {
-            if !is_inside(end) || ON_GROUND < (ground_under(module, end) - f64::from(end.z)).abs() {
-                continue;
-            }
-            let [east, north] = run(end, next);
-            let is_across = |corner: &&ModuleVertex| {
-                let [x, y] = run(end, corner);
-                let apart = x.hypot(y);
-                apart <= reach && (x * east + y * north).abs() <= ALONG_MAX * apart * east.hypot(north)
-            };
-            for corner in module.decks.vertices.iter().filter(|corner| is_inside(corner)).filter(is_across) {
-                let place = [(module.id.col, corner.x), (module.id.row, corner.y)]
-                    .map(|(number, at)| u64::from(number) * u64::from(module.side) + u64::from(at));
-                // Where a way is a line, the ground beside it may rise as far.
-                let road = ground_under(module, corner).max(f64::from(end.z));
-                highest = highest.max(DeckStep { rise: (f64::from(corner.z) - road).max(0.0) as u32, place });
-            }
-        }
+        [(line.vertices[0], line.vertices[1]), (last, before_last)].map(|(at, next)| End { at, next, reach }).into()
+    };
+    let is_on_ground = |end: &End| (ground_under(module, &end.at) - f64::from(end.at.z)).abs() <= ON_GROUND;
+    let ends = module.lines.iter().filter(is_bridge).flat_map(ends);
+    let ends: Vec<End> = ends.filter(|end| is_inside(&end.at) && is_on_ground(end)).collect();
+    let step = |corner: &ModuleVertex| {
+        // Where a way is a line, the ground beside it rises as it does without the bridge.
+        let above_ground = f64::from(corner.z) - ground_under(module, corner);
+        let rise = ends.iter().filter_map(|end| end.rise(corner)).min()?.min(above_ground.max(0.0) as u32);
+        let place = [(module.id.col, corner.x), (module.id.row, corner.y)]
+            .map(|(number, at)| u64::from(number) * u64::from(module.side) + u64::from(at));
+        Some(DeckStep { rise, place })
+    };
+    module.decks.vertices.iter().filter(|corner| is_inside(corner)).filter_map(step).max().unwrap_or_default()
+}
+
+/// An end of a bridge's line, the vertex next to it, and how far corners there are at most, in quanta.
+struct End {
+    at: ModuleVertex,
+    next: ModuleVertex,
+    reach: f64,
+}
+
+impl End {
+    /// How far a corner stands above it, where it lies beside it, across the bridge.
+    fn rise(&self, corner: &ModuleVertex) -> Option<u32> {
+        let run = |to: &ModuleVertex| [f64::from(to.x) - f64::from(self.at.x), f64::from(to.y) - f64::from(self.at.y)];
+        let ([east, north], [x, y]) = (run(&self.next), run(corner));
+        let apart = x.hypot(y);
+        let is_across = (x * east + y * north).abs() <= ALONG_MAX * apart * east.hypot(north);
+        (apart <= self.reach && is_across).then(|| (corner.z - self.at.z).max(0).unsigned_abs())
     }
-    highest
 }
 
 /// The highest that the ground is under a vertex, in quanta.
@@ -285,6 +297,27 @@ mod tests {
         module.vertices[0].z = -16;
         module.vertices[1].z = -16;
         assert_eq!(DeckFigures::of(&module).clearance.into_keys().collect::<Vec<_>>(), [1]);
+    }
+
+    #[test]
+    fn a_step_onto_a_deck_is_found_where_its_bridge_ends_on_the_ground() {
+        let step = |south: i32| {
+            let mut module = module([200, 100, 0, 0]);
+            let traits = LineTraits {
+                kind: LineKind::Travelled,
+                form: LineForm::Strip,
+                storey: LineStorey::Bridge,
+                is_kept: true,
+                is_in_ground: false,
+                width: 1280,
+            };
+            let vertices = vec![vertex(4640, 5000, south), vertex(4640, 7560, 0)];
+            module.lines.push(ModuleLine { class: 3, traits, vertices });
+            DeckFigures::of(&module).step
+        };
+        assert_eq!(step(0), DeckStep { rise: 200, place: [4000, 5000] });
+        assert_eq!(step(20).rise, 180);
+        assert_eq!(step(64).rise, 0, "it ends in the air");
     }
 
     #[test]

@@ -173,7 +173,8 @@ pub struct ReportFeatureChecks {
     /// How far it does at most, in metres.
     #[serde(default)]
     pub deck_under_max_m: f64,
-    /// How far a corner of a deck stands above the road at most where its bridge ends on the ground, in metres.
+    /// How far a corner of a deck stands above the road, and the ground under it, at most where its bridge ends on the
+    /// ground, in metres.
     #[serde(default)]
     pub deck_step_max_m: f64,
     /// Where: easting and northing in metres.

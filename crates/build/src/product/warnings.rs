@@ -326,6 +326,15 @@ mod tests {
     }
 
     #[test]
+    fn a_step_that_no_vehicle_climbs_is_told() {
+        let told = |deck_step_max_m| {
+            let report = report(Some(ReportFeatureChecks { deck_step_max_m, ..ReportFeatureChecks::default() }));
+            warnings(&Made { report: &report, features: None })
+        };
+        assert!(told(0.5).is_empty() && told(0.75)[0].contains("0.75 m above the road"));
+    }
+
+    #[test]
     fn a_surface_far_beyond_its_sources_is_told() {
         let told = |outside_m, sources_m| {
             let heights = Some(ReportHeights { surface_m: [0.0, 0.0], sources_m, outside_m });
