@@ -234,14 +234,12 @@ impl AreaFeatures {
         let beside_water = |place: Place, height: i32| drawn.ground(place.into(), height);
         let at = |place: Place| natural(place).map(|height| beside_water(place, height));
         let middle = |place: Place| middle(place).map(|height| beside_water(place, height));
-        let known = |place: Place| middle(place).and(at(place));
-        let resting = ground_of(&self.roads, &known, &near);
+        let resting = ground_of(&self.roads, &|place| middle(place).and(at(place)), &near);
         let mut hills = under_hills(&self.roads, &resting, options.cut_max);
         let roads = &*self.roads.with_tunnels(&hills);
         let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
         let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
-        let amid: Vec<Option<i32>> =
-            roads.nodes.iter().zip(&resting).map(|(node, ground)| middle(node.place).or(*ground)).collect();
+        let amid = middles_of(roads, &middle, &resting);
         let mut below = water(&strands);
         below.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
         let heights = grade(roads, [&resting, &amid], &pins, &below, options, &mut remarks);
@@ -303,8 +301,7 @@ impl AreaFeatures {
             ground.and_then(|ground| banks.iter().filter_map(|place| at(*place)).chain([ground]).min())
         };
         let lower_bank: Vec<Option<i32>> = self.river_banks.iter().zip(&ground).map(lowest).collect();
-        let middles: Vec<Option<i32>> =
-            rivers.nodes.iter().zip(&ground).map(|(node, ground)| middle(node.place).or(*ground)).collect();
+        let middles = middles_of(rivers, middle, &ground);
         let still = lakes_along(outlines, &waters.lakes, rivers, site);
         let bed = Bed { ground: &ground, middle: &middles, lower_bank: &lower_bank };
         let fallen = fall(rivers, bed, &still, falls, remarks);
@@ -370,6 +367,11 @@ fn ground_of(network: &Network, at: Ground, near: Ground) -> Vec<Option<i32>> {
     let mut ground: Vec<Option<i32>> = network.nodes.iter().map(|node| at(node.place)).collect();
     network.give_heights(&mut ground, &|node| near(place(node)));
     ground
+}
+
+/// The middle one of nine heights around each node of a network, else its ground.
+fn middles_of(network: &Network, middle: Ground, ground: &[Option<i32>]) -> Vec<Option<i32>> {
+    network.nodes.iter().zip(ground).map(|(node, ground)| middle(node.place).or(*ground)).collect()
 }
 
 /// Of each node of a network, the places a post to the left and to the right of its way.

@@ -150,7 +150,7 @@ mod tests {
             rows.dedup();
             rows
         };
-        let post = crate::samples::site().lattice.steps_per_post() as i32;
+        let post = crate::samples::site().lattice.steps_per_post();
         assert!(matches!(rows(1)[..], [row] if row < 10 * post), "{:?}", rows(1));
         assert!(matches!(rows(2)[..], [row] if 11 * post < row), "{:?}", rows(2));
     }

@@ -53,11 +53,13 @@ impl Kind {
     /// Version of its files. Files of another one are made again.
     fn version(self) -> u32 {
         match self {
-            // 2: how much the ground curves; 3: residuals against the sources alone.
-            Kind::Measured => 3,
+            // 2: how much the ground curves; 3: residuals against the sources alone; 4: steps onto decks.
+            Kind::Measured => 4,
             // 2: corners as steps from one to the next.
             Kind::Buildings => 2,
-            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Profile | Kind::Lines | Kind::Level | Kind::Objects => 1,
+            // 2: nothing over holes.
+            Kind::Profile => 2,
+            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Lines | Kind::Level | Kind::Objects => 1,
         }
     }
 }

@@ -9,7 +9,8 @@ use crate::ground::source::reading;
 /// Load modules looked at, at most, for the largest rectangle that is covered.
 const MODULES_MAX: usize = 1 << 22;
 
-/// Corners of load modules looked at, at most, to see whether more fit where they begin a part of one farther on.
+/// Corners of load modules looked for in rasters, at most, to see whether more fit where they begin a part of one
+/// farther on.
 const CORNERS_MAX: usize = 1 << 18;
 
 /// Finds the area that a job asks for; for [`job::Job::load_with`].
@@ -186,28 +187,29 @@ pub fn covered(
         return Err(no_area(format!("sources spread over {rows} x {cols} load modules")));
     }
     let posts = (side_m / spacing.metres()).round().max(1.0) as usize;
-    let phases = (CORNERS_MAX / ((rows + 1) * (cols + 1))).isqrt().clamp(1, posts);
-    let mut best: Option<(usize, ([f64; 2], [f64; 2]))> = None;
+    let looks = (rows + 1) * (cols + 1) * frames.len().max(1);
+    let phases = (CORNERS_MAX / looks).isqrt().clamp(1, posts);
+    let mut best: Option<([f64; 2], [f64; 2])> = None;
+    let extent = |(_, size_m): ([f64; 2], [f64; 2])| size_m[0] * size_m[1];
     for phase in (0..phases * phases).map(|number| [number % phases, number / phases]) {
         let by = phase.map(|phase| (phase * posts / phases) as f64 * spacing.metres());
         let found = covered_from([0, 1].map(|axis| origin[axis] + by[axis]), high, &footprints, side_m);
-        if let Some((count, area)) = found
-            && best.is_none_or(|(most, _)| most < count)
+        if let Some(area) = found
+            && best.is_none_or(|best| extent(best) < extent(area))
         {
-            best = Some((count, area));
+            best = Some(area);
         }
     }
-    let found = best.map(|(_, area)| area);
-    found.ok_or_else(|| no_area(format!("not one load module of {side_m} m fits inside the sources")))
+    best.ok_or_else(|| no_area(format!("not one load module of {side_m} m fits inside the sources")))
 }
 
-/// The same of load modules on a grid through `origin`, up to `high`; with their number.
+/// The same of load modules on a grid through `origin`, up to `high`.
 fn covered_from(
     origin: [f64; 2],
     high: [f64; 2],
     footprints: &Footprints,
     side_m: f64,
-) -> Option<(usize, ([f64; 2], [f64; 2]))> {
+) -> Option<([f64; 2], [f64; 2])> {
     let [cols, rows] = [0, 1].map(|axis| ((high[axis] - origin[axis]) / side_m + 1.0e-6).floor().max(0.0) as usize);
     let corner =
         |row: usize, col: usize| footprints.holds([origin[0] + col as f64 * side_m, origin[1] + row as f64 * side_m]);
@@ -216,7 +218,7 @@ fn covered_from(
         |row: usize, col: usize| held[row][col] && held[row][col + 1] && held[row + 1][col] && held[row + 1][col + 1];
     let [south, west, high, wide] = largest_rectangle(rows, cols, whole)?;
     let place = |axis: usize, modules: usize| origin[axis] + modules as f64 * side_m;
-    Some((high * wide, ([place(0, west), place(1, south)], [wide as f64 * side_m, high as f64 * side_m])))
+    Some(([place(0, west), place(1, south)], [wide as f64 * side_m, high as f64 * side_m]))
 }
 
 /// South-west and north-east corners of the rectangle around rasters, in metres of a system; `None` where none of them

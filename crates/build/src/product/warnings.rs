@@ -64,7 +64,8 @@ pub(crate) const MATTERS: [Matter; 21] = [
         "lines of sight go where buildings or woods stand; larger limits keep them, as tiefort plan tells",
     ),
     matter(
-        "more than 5 % of a class of ways or of shores, and 100 m, beyond the limits of cut and fill, or 1 % beyond twice these",
+        "more than 5 % of a class of ways or of shores, and 100 m, beyond the limits of cut and fill, or 1 % beyond \
+         twice these",
         Told::Warning(earthworks),
         "they lie where no person believes them; less than that is listed with its cause",
     ),

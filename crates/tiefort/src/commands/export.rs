@@ -15,7 +15,7 @@ use store::Folder;
 use terrain::{MaterialName, ModuleId, PostRect};
 use views::grouped;
 
-use super::export_formats::{ENCODINGS, ENGINES, Format, Layer, TEXTURES};
+use super::export_formats::{ENCODINGS, ENGINES, Format, Layer, TEXTURES, material};
 use super::export_together::Several;
 use crate::arguments::{Workers, coordinates, one_of, row_col};
 use crate::failure::{Failure, Outcome};
@@ -153,12 +153,6 @@ fn block(text: &str) -> Result<Block, String> {
 fn texel_m(text: &str) -> Result<f64, String> {
     let metres = text.parse().ok().filter(|metres: &f64| (0.001..=1e6).contains(metres));
     metres.ok_or_else(|| "expected metres, such as 0.5".to_owned())
-}
-
-fn material(text: &str) -> Result<(String, String), String> {
-    let named = text.split_once('=').filter(|(word, name)| !word.is_empty() && !name.is_empty());
-    let (word, name) = named.ok_or("expected MATERIAL=NAME, such as primary=asphalt")?;
-    Ok((word.to_owned(), name.to_owned()))
 }
 
 /// Reads what heights are to be taken to be above.

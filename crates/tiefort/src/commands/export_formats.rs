@@ -112,3 +112,10 @@ impl Format {
         matches!(self, Format::QuantizedMesh | Format::Mbtiles | Format::Tiles3dTerrain)
     }
 }
+
+/// Reads another name for a material.
+pub fn material(text: &str) -> Result<(String, String), String> {
+    let named = text.split_once('=').filter(|(word, name)| !word.is_empty() && !name.is_empty());
+    let (word, name) = named.ok_or("expected MATERIAL=NAME, such as primary=asphalt")?;
+    Ok((word.to_owned(), name.to_owned()))
+}

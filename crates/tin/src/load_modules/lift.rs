@@ -30,8 +30,8 @@ const SHARE_MIN_FREE: f64 = 0.1;
 /// The same at last, when no corner can be added: a deck that rises steeply is better than one in the ground.
 const SHARE_MIN_LAST: f64 = 0.3;
 
-/// Quanta that a corner at an end of a deck may rise above the ground there, where no corner can be added: half a metre,
-/// which a vehicle climbs.
+/// Quanta that a corner at an end of a deck may rise above the ground there, where no corner can be added: half a
+/// metre, which a vehicle climbs.
 const STEP_MAX: f64 = 64.0;
 
 /// How often all places are gone through at most where no corner can be added.

@@ -59,7 +59,8 @@ pub(crate) fn round_heights(sheet: &mut TileMesh) {
 
 /// Brings back the heights of vertices of which posts tell less than one does where it stands: to those of their
 /// neighbours and of the ground there, and a metre or a tenth of that range beyond. Among triangles smaller than posts
-/// are apart, beside features, a post near the foot of a triangle raised its top many times as far as it lay off itself.
+/// are apart, beside features, a post near the foot of a triangle raised its top many times as far as it lay off
+/// itself.
 fn bind_loose_heights(sheet: &mut TileMesh) {
     /// Squares of the shares that posts have in a height, below which it is loose.
     const LOOSE: f64 = 1.0;
