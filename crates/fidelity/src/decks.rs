@@ -37,18 +37,9 @@ pub struct DeckFigures {
     /// middle lines cross, or run below the deck 30 m and more from where bridges end, above level ground of a class
     /// that has no middle line, such as lakes, anywhere.
     pub clearance: BTreeMap<u8, i32>,
-    /// The highest step onto a deck.
-    pub step: DeckStep,
-}
-
-/// How far a corner of a deck stands above the end of its bridge's line, where that ends on the ground, and above the
-/// ground under it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub struct DeckStep {
-    /// Quanta.
-    pub rise: u32,
-    /// Where: quanta east and north of the area's south-west corner.
-    pub place: [u64; 2],
+    /// The highest step onto a deck: how far a corner stands above the end of its bridge's line, where that ends on the
+    /// ground, and above the ground under it, in quanta.
+    pub step: u32,
 }
 
 impl DeckFigures {
@@ -133,7 +124,7 @@ fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
 
 /// The highest step onto a deck: of corners beside an end of a bridge's line, where that ends on the ground. One beside
 /// several ends belongs to that from which it rises least.
-fn highest_step(module: &LoadModule) -> DeckStep {
+fn highest_step(module: &LoadModule) -> u32 {
     let is_inside = |vertex: &ModuleVertex| [vertex.x, vertex.y].iter().all(|at| (1..module.side).contains(at));
     let is_bridge = |line: &&ModuleLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
     let ends = |line: &ModuleLine| -> Vec<End> {
@@ -147,12 +138,9 @@ fn highest_step(module: &LoadModule) -> DeckStep {
     let step = |corner: &ModuleVertex| {
         // Where a way is a line, the ground beside it rises as it does without the bridge.
         let above_ground = f64::from(corner.z) - ground_under(module, corner);
-        let rise = ends.iter().filter_map(|end| end.rise(corner)).min()?.min(above_ground.max(0.0) as u32);
-        let place = [(module.id.col, corner.x), (module.id.row, corner.y)]
-            .map(|(number, at)| u64::from(number) * u64::from(module.side) + u64::from(at));
-        Some(DeckStep { rise, place })
+        Some(ends.iter().filter_map(|end| end.rise(corner)).min()?.min(above_ground.max(0.0) as u32))
     };
-    module.decks.vertices.iter().filter(|corner| is_inside(corner)).filter_map(step).max().unwrap_or_default()
+    module.decks.vertices.iter().filter(|corner| is_inside(corner)).filter_map(step).max().unwrap_or(0)
 }
 
 /// An end of a bridge's line, the vertex next to it, and how far corners there are at most, in quanta.
@@ -259,6 +247,18 @@ mod tests {
         ModuleVertex { y, x, z }
     }
 
+    fn line(class: u8, storey: LineStorey, places: &[(u16, u16, i32)]) -> ModuleLine {
+        let traits = LineTraits {
+            kind: LineKind::Travelled,
+            form: LineForm::Line,
+            storey,
+            is_kept: true,
+            is_in_ground: storey == LineStorey::Ground,
+            width: 640,
+        };
+        ModuleLine { class, traits, vertices: places.iter().map(|&(x, y, z)| vertex(x, y, z)).collect() }
+    }
+
     /// A load module of 100 m at height 0, its northern half of class 1, under a deck of 20 m by 10 m over both halves.
     fn module(heights: [i32; 4]) -> LoadModule {
         let [a, b, c, d] = [(4000, 5000), (5280, 5000), (5280, 7560), (4000, 7560)];
@@ -303,37 +303,14 @@ mod tests {
     fn a_step_onto_a_deck_is_found_where_its_bridge_ends_on_the_ground() {
         let step = |south: i32| {
             let mut module = module([200, 100, 0, 0]);
-            let traits = LineTraits {
-                kind: LineKind::Travelled,
-                form: LineForm::Strip,
-                storey: LineStorey::Bridge,
-                is_kept: true,
-                is_in_ground: false,
-                width: 1280,
-            };
-            let vertices = vec![vertex(4640, 5000, south), vertex(4640, 7560, 0)];
-            module.lines.push(ModuleLine { class: 3, traits, vertices });
+            module.lines = vec![line(3, LineStorey::Bridge, &[(4300, 5000, south), (4300, 7560, 0)])];
             DeckFigures::of(&module).step
         };
-        assert_eq!(step(0), DeckStep { rise: 200, place: [4000, 5000] });
-        assert_eq!(step(20).rise, 180);
-        assert_eq!(step(64).rise, 0, "it ends in the air");
+        assert_eq!([0, 20, 64].map(step), [200, 180, 0], "the last ends in the air");
     }
 
     #[test]
     fn a_bridge_passes_over_the_line_it_crosses_and_not_over_those_it_ends_at() {
-        let line = |class, storey, places: &[(u16, u16, i32)]| ModuleLine {
-            class,
-            traits: LineTraits {
-                kind: LineKind::Travelled,
-                form: LineForm::Line,
-                storey,
-                is_kept: true,
-                is_in_ground: storey == LineStorey::Ground,
-                width: 640,
-            },
-            vertices: places.iter().map(|&(x, y, z)| vertex(x, y, z)).collect(),
-        };
         let mut module = module([256, 256, 768, 768]);
         let bridge = [(4640, 5000, 256), (4640, 7560, 768)];
         module.lines = vec![

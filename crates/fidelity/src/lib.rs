@@ -32,7 +32,7 @@ pub use split::{Split, best_split};
 mod source;
 pub use source::{PushRow, SourcePosts, residuals_at_source};
 mod decks;
-pub use decks::{DeckFigures, DeckStep};
+pub use decks::DeckFigures;
 mod places;
 pub use places::residuals_at_places;
 mod cells;

@@ -70,11 +70,9 @@ pub struct MeasuredFeatures {
     pub shore_below: u64,
     /// Residuals outside features and their slopes.
     pub outside: MeasuredTally,
-    /// Places of decks that were looked at, those with ground above them, and how far it is at most, in quanta.
-    pub decks: (u64, u64, u32),
-    /// The highest step onto a deck where its bridge ends, in quanta, and where: quanta east and north of the area's
-    /// south-west corner.
-    pub deck_step: (u32, [u64; 2]),
+    /// Places of decks that were looked at, those with ground above them, how far it is at most, and the highest step
+    /// onto a deck where its bridge ends, both in quanta.
+    pub decks: (u64, u64, u32, u32),
     /// The least height of decks above what they cross of each class, in quanta.
     pub deck_clearance: Vec<(u8, i32)>,
 }

@@ -177,9 +177,6 @@ pub struct ReportFeatureChecks {
     /// ground, in metres.
     #[serde(default)]
     pub deck_step_max_m: f64,
-    /// Where: easting and northing in metres.
-    #[serde(default)]
-    pub deck_step_at_m: [f64; 2],
 }
 
 /// How low decks pass over one class of ways or water.

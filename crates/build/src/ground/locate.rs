@@ -181,8 +181,7 @@ pub fn covered(
     let footprints = Footprints { frames, crs };
     let [low, high] = footprints.bounds().ok_or_else(|| no_area("no source lies in this coordinate system".into()))?;
     let origin = first_post(frames, crs, low, spacing.metres());
-    let count = [0, 1].map(|axis| ((high[axis] - origin[axis]) / side_m + 1.0e-6).floor().max(0.0));
-    let [cols, rows] = count.map(|modules| modules as usize);
+    let [cols, rows] = modules_between(origin, high, side_m);
     if MODULES_MAX < rows.saturating_mul(cols) {
         return Err(no_area(format!("sources spread over {rows} x {cols} load modules")));
     }
@@ -203,6 +202,11 @@ pub fn covered(
     best.ok_or_else(|| no_area(format!("not one load module of {side_m} m fits inside the sources")))
 }
 
+/// Columns and rows of whole load modules from `low` to `high`.
+fn modules_between(low: [f64; 2], high: [f64; 2], side_m: f64) -> [usize; 2] {
+    [0, 1].map(|axis| ((high[axis] - low[axis]) / side_m + 1.0e-6).floor().max(0.0) as usize)
+}
+
 /// The same of load modules on a grid through `origin`, up to `high`.
 fn covered_from(
     origin: [f64; 2],
@@ -210,7 +214,7 @@ fn covered_from(
     footprints: &Footprints,
     side_m: f64,
 ) -> Option<([f64; 2], [f64; 2])> {
-    let [cols, rows] = [0, 1].map(|axis| ((high[axis] - origin[axis]) / side_m + 1.0e-6).floor().max(0.0) as usize);
+    let [cols, rows] = modules_between(origin, high, side_m);
     let corner =
         |row: usize, col: usize| footprints.holds([origin[0] + col as f64 * side_m, origin[1] + row as f64 * side_m]);
     let held: Vec<Vec<bool>> = (0..=rows).map(|row| (0..=cols).map(|col| corner(row, col)).collect()).collect();

@@ -1,6 +1,6 @@
 //! Between tallies and figures and the files that keep them.
 
-use fidelity::{Curvature, DeckFigures, DeckStep, FeatureFigures, Tally};
+use fidelity::{Curvature, DeckFigures, FeatureFigures, Tally};
 use store::{MeasuredCurvature, MeasuredFeatures, MeasuredTally};
 use terrain::LatticePoint;
 
@@ -48,8 +48,7 @@ pub(crate) fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: to_tally(outside),
-        decks: (decks.samples, decks.under, decks.deepest),
-        deck_step: (decks.step.rise, decks.step.place),
+        decks: (decks.samples, decks.under, decks.deepest, decks.step),
         deck_clearance: decks.clearance.iter().map(|(&class, &least)| (class, least)).collect(),
     }
 }
@@ -57,8 +56,8 @@ pub(crate) fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
 /// The figures of features that were kept.
 pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
     let MeasuredFeatures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = measured;
-    let &MeasuredFeatures { decks: (samples, under, deepest), deck_step: (rise, place), .. } = measured;
-    let MeasuredFeatures { lake_banks_m2, deck_clearance, outside, .. } = measured;
+    let &MeasuredFeatures { decks: (samples, under, deepest, step), ref deck_clearance, ref outside, .. } = measured;
+    let MeasuredFeatures { lake_banks_m2, .. } = measured;
     let clearance = deck_clearance.iter().copied().collect();
     let ends =
         |&[row, col, to_row, to_col]: &[i32; 4]| [LatticePoint::new(row, col), LatticePoint::new(to_row, to_col)];
@@ -71,7 +70,7 @@ pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: from_tally(outside),
-        decks: DeckFigures { samples, under, deepest, clearance, step: DeckStep { rise, place } },
+        decks: DeckFigures { samples, under, deepest, clearance, step },
     }
 }
 
@@ -85,8 +84,7 @@ mod tests {
         figures.missing = vec![[LatticePoint::new(1, -2), LatticePoint::new(3, 4)]];
         (figures.shore_posts, figures.shore_below, figures.lake_banks_m2) = (7, 2, 5);
         figures.outside.add(-17);
-        let step = DeckStep { rise: 3, place: [70_000, 4] };
-        figures.decks = DeckFigures { samples: 9, under: 1, deepest: 5, clearance: [(2, -5)].into(), step };
+        figures.decks = DeckFigures { samples: 9, under: 1, deepest: 5, clearance: [(2, -5)].into(), step: 3 };
         assert_eq!(from_features(&to_features(&figures)), figures);
     }
 

@@ -182,11 +182,7 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
         deck_samples: figures.decks.samples,
         deck_samples_under: figures.decks.under,
         deck_under_max_m: metres(figures.decks.deepest),
-        deck_step_max_m: metres(figures.decks.step.rise),
-        deck_step_at_m: [0, 1].map(|axis| {
-            let from_corner = figures.decks.step.place[axis] as f64 / f64::from(QUANTA_PER_METRE);
-            if figures.decks.step.rise == 0 { 0.0 } else { extent_m[axis] + from_corner }
-        }),
+        deck_step_max_m: metres(figures.decks.step),
         ..ReportFeatureChecks::default()
     };
     for line in &level.lines {

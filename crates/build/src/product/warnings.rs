@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use job::Job;
-use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance, ReportFeatureChecks};
+use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance};
 
 use crate::product::earthworks;
 
@@ -46,7 +46,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 21] = [
+pub(crate) const MATTERS: [Matter; 20] = [
     matter(
         "files, datums, holes and rules of sources, or metres of the area's system, that are not as they should be",
         Told::OfStage,
@@ -84,11 +84,6 @@ pub(crate) const MATTERS: [Matter; 21] = [
         "decks under the ground",
         Told::Warning(decks_under),
         "corners of decks rise onto it as far as they can; vehicles would run into the ground",
-    ),
-    matter(
-        "a step of more than half a metre onto a deck",
-        Told::Warning(deck_steps),
-        "ground beside the bridge is higher there, and its corners rise onto that; vehicles would meet the step",
     ),
     matter(
         "bridges through ground that is higher",
@@ -175,20 +170,6 @@ fn decks_under(made: &Made) -> Vec<String> {
         )
     };
     (0 < checks.deck_samples_under).then(told).into_iter().collect()
-}
-
-/// A corner of a deck stands well above the road that leads onto it.
-fn deck_steps(made: &Made) -> Vec<String> {
-    const STEP_MAX_M: f64 = 0.5;
-    let checks = made.report.features.iter().map(|features| &features.checks);
-    let told = |checks: &ReportFeatureChecks| {
-        let ([east, north], step_m) = (checks.deck_step_at_m, checks.deck_step_max_m);
-        format!(
-            "a deck begins up to {step_m:.2} m above the road that leads onto it, most at {east:.1} {north:.1}, where \
-             ground beside it is higher"
-        )
-    };
-    checks.filter(|checks| STEP_MAX_M < checks.deck_step_max_m).map(told).collect()
 }
 
 /// Bridges lie lower than the ways and the water that they cross.
@@ -304,7 +285,7 @@ fn beyond_sources(made: &Made) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use store::{ReportFeatures, ReportHeights};
+    use store::{ReportFeatureChecks, ReportFeatures, ReportHeights};
 
     use super::*;
 
@@ -324,15 +305,6 @@ mod tests {
             std::fs::write(path, whole).unwrap();
         }
         assert_eq!(found, table(), "UPDATE_GOLDEN=1 rewrites {path}");
-    }
-
-    #[test]
-    fn a_step_that_no_vehicle_climbs_is_told() {
-        let told = |deck_step_max_m| {
-            let report = report(Some(ReportFeatureChecks { deck_step_max_m, ..ReportFeatureChecks::default() }));
-            warnings(&Made { report: &report, features: None })
-        };
-        assert!(told(0.5).is_empty() && told(0.75)[0].contains("0.75 m above the road"));
     }
 
     #[test]
