@@ -75,28 +75,68 @@ impl Refinement {
     }
 
     fn run_given(&self, window: &Window, in_squares: Option<&Importance>, seeds: &[Vertex]) -> TileTin {
-        let grown = |task: &TileTask| {
+        let grown = |task: &TileTask, importance: &Importance| {
             let level = terrain::geometry::widest_level();
             let differs = |seed: &Vertex| seed.at.post().is_some_and(|post| window.dem.height(post) != seed.height);
             if !seeds.iter().any(differs) {
-                return tin::refine(&window.dem, &window.importance, task, level);
+                return tin::refine(&window.dem, importance, task, level);
             }
-            tin::refine(&with_heights(&window.dem, seeds), &window.importance, task, level)
+            tin::refine(&with_heights(&window.dem, seeds), importance, task, level)
         };
-        let Some(optimising) = self.optimising else { return self.woven(window, grown(&self.task)) };
-        let enough = self.to_largest(&grown);
-        let own = enough.as_ref().map_or(self, |(own, _)| own);
-        let grown = grown(&own.beyond_budget(optimising));
-        let in_squares = in_squares.cloned();
-        let task = Task { in_squares, ..own.optimisation(optimising, grown.initial_count, &window.forbidden) };
-        let optimised = optimise(&window.dem, &window.importance, &grown.tin, &task);
-        match enough {
-            // By its own order of choosing so many do not reach the residual, by worst posts they do.
-            Some((_, plain)) if optimised.stop != StopReason::ResidualReached && plain.refused.is_empty() => {
-                self.woven(window, plain)
+        let weighted = &window.importance;
+        let Some(optimising) = self.optimising else { return self.woven(window, grown(&self.task, weighted)) };
+        // A largest residual is asked of every post alike.
+        let even = self.guard().map(|_| evened(weighted));
+        let chosen = even.as_ref().unwrap_or(weighted);
+        let in_squares = in_squares.or(even.as_ref().map(|_| weighted));
+        let optimised = |own: &Self| {
+            let mut task = own.beyond_budget(optimising);
+            if let (Rule::LargestSquares { guard }, false) = (&mut task.rule, is_even(weighted)) {
+                *guard = None;
             }
-            _ => own.join(grown, optimised),
+            let grown = grown(&task, if is_even(weighted) { chosen } else { weighted });
+            let task = own.optimisation(optimising, grown.initial_count, &window.forbidden);
+            let task = Task { in_squares: in_squares.cloned(), ..task };
+            let optimised = optimise(&window.dem, chosen, &grown.tin, &task);
+            (grown, optimised)
+        };
+        let Some((mut own, plain)) = self.to_largest(&|task| grown(task, chosen)) else {
+            let (grown, optimised) = optimised(self);
+            return self.join(grown, optimised);
+        };
+        loop {
+            let (grown, optimised) = optimised(&own);
+            let is_reached = optimised.stop == StopReason::ResidualReached;
+            if self.features.kept.is_empty() && !is_reached && plain.refused.is_empty() {
+                // By its own order of choosing so many do not reach the residual, by worst posts they do.
+                return plain;
+            }
+            if is_reached || own.task == self.task && own.most == self.most {
+                return own.join(grown, optimised);
+            }
+            // Worst posts alone did not know of the features.
+            own = own.with_twice_as_much(self);
         }
+    }
+
+    /// The largest residual that is asked for, in thousandths of a quantum.
+    fn guard(&self) -> Option<u64> {
+        match self.task.rule {
+            Rule::LargestSquares { guard } => guard,
+            Rule::WorstFirst | Rule::Batches { .. } => None,
+        }
+    }
+
+    /// The same with twice as much to spend, and no more than `full` has.
+    fn with_twice_as_much(&self, full: &Self) -> Self {
+        let mut own = self.clone();
+        match (&mut own.task.frame, &full.task.frame) {
+            (Frame::Sides { allowance, .. }, Frame::Sides { allowance: most, .. }) => {
+                allowance.triangles = (2 * allowance.triangles.max(1)).min(most.triangles);
+            }
+            _ => (own.task, own.most) = (full.task.clone(), full.most),
+        }
+        own
     }
 
     /// A TIN as it grew, with features among its vertices.
@@ -112,8 +152,7 @@ impl Refinement {
     /// Where a largest residual ends the choosing before the budget does: the TIN that reaches it by worst posts alone,
     /// and this refinement with no more to spend than that took.
     fn to_largest(&self, grown: &impl Fn(&TileTask) -> TileTin) -> Option<(Self, TileTin)> {
-        let Rule::LargestSquares { guard: Some(value) } = self.task.rule else { return None };
-        let stop = Stop { value: Some(value), rms_quanta: None, ..self.task.stop };
+        let stop = Stop { value: Some(self.guard()?), rms_quanta: None, ..self.task.stop };
         let plain = grown(&TileTask { rule: Rule::WorstFirst, stop, ..self.task.clone() });
         if plain.stop == StopReason::BudgetSpent {
             return None;
@@ -171,10 +210,6 @@ impl Refinement {
                 Budget::Vertices(task.stop.points.map_or(NO_LIMIT as usize, |points| points + initial as usize))
             }
         };
-        let guard = match task.rule {
-            Rule::LargestSquares { guard } => guard,
-            Rule::WorstFirst | Rule::Batches { .. } => None,
-        };
         Task {
             held,
             features: self.features.kept.clone(),
@@ -191,7 +226,7 @@ impl Refinement {
             lattice: optimising.lattice,
             rms_quanta: task.stop.rms_quanta,
             forbidden: forbidden.to_vec(),
-            largest_quanta: guard.map(|value| value as f64 / f64::from(THOUSANDTHS)),
+            largest_quanta: self.guard().map(|value| value as f64 / f64::from(THOUSANDTHS)),
         }
     }
 
@@ -238,6 +273,27 @@ pub(crate) fn give(task: &mut TileTask, given: &[GivenPost], rect: PostRect) {
     task.border.extend(outer);
     let pinned = task.start.iter().filter(|start| start.pinned).count();
     task.stop.points = task.stop.points.map(|points| points.saturating_sub(pinned));
+}
+
+/// The same weight wherever there is one.
+fn evened(importance: &Importance) -> Importance {
+    let even = |weight: u16| if weight == 0 { 0 } else { THOUSANDTHS };
+    let rect = importance.rect();
+    match importance.uniform_weight() {
+        Some(weight) => Importance::uniform(rect, even(weight)),
+        None => {
+            let weights = rect.posts().map(|post| even(importance.weight(post))).collect();
+            Importance::new(rect, weights, rect.posts().map(|post| importance.class(post)).collect())
+        }
+    }
+}
+
+/// Whether all posts that count weigh the same.
+fn is_even(importance: &Importance) -> bool {
+    let rect = importance.rect();
+    let mut weights = rect.posts().map(|post| importance.weight(post)).filter(|weight| 0 < *weight);
+    let first = importance.uniform_weight().or_else(|| weights.next());
+    importance.uniform_weight().is_some() || weights.all(|weight| Some(weight) == first)
 }
 
 /// The DEM with the heights of the seeds.

@@ -6,7 +6,9 @@ use crate::ground::GamingArea;
 use job::{Allocation, Borders, Budget as PointBudget, Edges, Effort, ErrorKey, Job, Method, OuterBorder};
 use store::TileBudget;
 use terrain::limits::Allowance;
-use terrain::{Features, ModuleId, ModuleRect, Post, SeamSides, Side, TileFeatures, TileId, TileTin, Vertex};
+use terrain::{
+    Features, ModuleId, ModuleRect, Post, SeamSides, Side, THOUSANDTHS, TileFeatures, TileId, TileTin, Vertex,
+};
 use tin::tiling::{Budget, Tiling, outer_border_posts, outer_sides};
 use tin::{CostUnit, Frame, Proximity, Rule, Stop, SurveyTask, TileTask};
 
@@ -134,12 +136,14 @@ pub(crate) fn rule(job: &Job, area: &GamingArea) -> Rule {
     }
 }
 
-/// `max_residual_m` as a weighted value: it holds where the ground matters most, and in proportion elsewhere.
+/// `max_residual_m` as a value: no post may have more, whatever it weighs. Where posts are optimised none weighs more
+/// than another for that; otherwise they are weighted, and those that weigh least come last.
 fn largest_value(job: &Job) -> Option<u64> {
     let quantum = if matches!(job.tin.method, Method::Paper { .. }) { job.tin.residual_quantum } else { 1 };
-    let heaviest = job.importance.heaviest();
+    let is_optimised = matches!(job.tin.method, Method::Optimised(_));
+    let weight = if is_optimised { THOUSANDTHS } else { job.importance.lightest() };
     let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor();
-    job.tin.max_residual_m.map(|metres| u64::from(heaviest) * units(metres) as u64)
+    job.tin.max_residual_m.map(|metres| u64::from(weight) * units(metres) as u64)
 }
 
 /// The survey of one tile: all it would select if it were alone.

@@ -22,6 +22,12 @@ impl ImportanceSpec {
     pub fn heaviest(&self) -> u16 {
         self.areas.iter().map(|area| area.weight).fold(self.default_weight, u16::max)
     }
+
+    /// The least weight of any ground that counts, in thousandths; water and pins not counted.
+    pub fn lightest(&self) -> u16 {
+        let weights = self.areas.iter().map(|area| area.weight).chain([self.default_weight]);
+        weights.filter(|weight| 0 < *weight).min().unwrap_or(1)
+    }
 }
 
 /// What the class of holes is called, which no class of a job may be: ground where no source has a height.

@@ -375,7 +375,7 @@ const TIN: &[Key] = &[
         .of(&[MethodName::Paper])
         .words::<LastBatch>()
         .usual("truncate"),
-    Key::new("max_residual_m", "choosing ends when no residual is larger")
+    Key::new("max_residual_m", "choosing ends when no residual is larger, whatever posts weigh")
         .number("metres", 0.0..=RESIDUAL_M_MAX)
         .otherwise("none")
         .example("max_residual_m = 10"),

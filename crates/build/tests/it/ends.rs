@@ -34,6 +34,25 @@ fn a_largest_residual_ends_the_choosing_whatever_the_method() {
 }
 
 #[test]
+fn a_largest_residual_holds_where_ground_weighs_little() {
+    let steep = "default = 8\nareas = [{ slope_above_percent = 15, smooth_m = 50, class = \"steep\", weight = 1 }]";
+    let limits = "per_load_module = 1000\nmean_per_load_module = 400\nper_4km_square = 50000";
+    for method in ["", "method = \"greedy\"\n"] {
+        let words = Words {
+            size: (6, 6),
+            tiles: (2, 2),
+            importance: steep.into(),
+            limits: limits.into(),
+            tin: format!("{method}max_residual_m = 20"),
+            ..Words::sample()
+        };
+        let scene = Scene::new(&words);
+        let largest = scene.build("area", 2).report.residual.max_m;
+        assert!(largest <= 20.0, "{method}{largest} m is left");
+    }
+}
+
+#[test]
 fn an_optimised_area_needs_no_more_triangles_for_a_largest_residual_than_worst_posts_first() {
     for metres in [20, 50, 150] {
         let of = |method: &str| triangles(&built(&format!("{method}max_residual_m = {metres}")));
