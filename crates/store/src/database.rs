@@ -379,6 +379,10 @@ fn examine(folder: &Folder, area: &Area) -> Result<Option<Manifest>, DatabaseErr
         }
         // Where it is damaged, other files tell by themselves what they were made from.
         Err(DatabaseError::WrongChecksum { .. }) => refuse_others(folder)?,
+        // A build makes all of its folders before that file; one that was cut short lies among them.
+        Err(DatabaseError::Malformed { .. }) if FOLDERS.iter().all(|name| is_folder(folder, name)) => {
+            refuse_others(folder)?;
+        }
         Err(
             error @ (DatabaseError::Missing { .. }
             | DatabaseError::NotADatabase { .. }
@@ -409,6 +413,10 @@ fn refuse_others(folder: &Folder) -> Result<(), DatabaseError> {
         let found = format!("{name:?} in it and a damaged {}", files::DATABASE);
         Err(DatabaseError::NotOurFolder { path: folder.dir().to_path_buf(), found })
     })
+}
+
+fn is_folder(folder: &Folder, name: &str) -> bool {
+    matches!(folder.store().entry(&folder.path(name)), Ok(Entry::Folder))
 }
 
 fn name_of(path: &Path) -> String {

@@ -107,21 +107,34 @@ fn a_damaged_manifest_is_an_error_of_verify_and_the_next_build_writes_it_again()
 }
 
 #[test]
-fn without_a_manifest_of_ours_a_folder_is_left_alone() {
+fn a_manifest_that_was_cut_short_is_written_again_where_all_else_is_ours() {
     let scene = scene("constrained");
+    let sound = scene.product("area");
     let path = scene.path("area").join("database.json");
     let text = fs::read_to_string(&path).unwrap();
-    for damaged in [Some(""), Some(&text[..text.len() / 2]), Some("{}"), None] {
-        match damaged {
-            Some(damaged) => fs::write(&path, damaged).unwrap(),
-            None => fs::remove_file(&path).unwrap(),
-        }
+    for damaged in ["", &text[..text.len() / 2], "{}"] {
+        fs::write(&path, damaged).unwrap();
         assert!(inspect::verify(&scene.path("area"), None).unwrap_err().to_string().contains("database.json"));
+        drop(scene.build("area", 2));
+        assert_same(&sound, &scene.product("area"), "cut short");
+    }
+}
+
+#[test]
+fn without_a_manifest_or_with_something_else_beside_a_damaged_one_a_folder_is_left_alone() {
+    let scene = scene("constrained");
+    let path = scene.path("area").join("database.json");
+    let refused = || {
         let before = scene.product("area");
         let error = scene.try_build("area", 2).unwrap_err();
         assert!(error.to_string().contains("expected an empty folder or a terrain database"), "{error}");
         assert_same(&before, &scene.product("area"), "refused");
-    }
+    };
+    fs::remove_file(&path).unwrap();
+    refused();
+    fs::write(&path, "{}").unwrap();
+    fs::write(scene.path("area").join("notes.txt"), "mine").unwrap();
+    refused();
 }
 
 #[test]
