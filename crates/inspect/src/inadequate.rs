@@ -95,7 +95,9 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let totals = &manifest.totals;
     let rms_m = (totals.residual_sum_squared as f64 / totals.residual_posts.max(1) as f64).sqrt();
     let tolerance_m = tolerance_m.unwrap_or(3.0 * rms_m / f64::from(terrain::QUANTA_PER_METRE));
-    let heaviest = heaviest(&window.importance, job.dem.water.as_ref().map(|water| water.class));
+    // What roads that had no room weigh beyond that says nothing of the ground beside them.
+    let natural = ground.natural(area.rect)?.importance;
+    let heaviest = heaviest(&natural, job.dem.water.as_ref().map(|water| water.class));
     let residual_m = weighted(modules.values(), &area, &window, heaviest);
     let counts: Vec<u32> = modules.values().map(|module| job.counted(module)).collect();
     let mut refused = BTreeSet::new();
