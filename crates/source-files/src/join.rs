@@ -34,6 +34,16 @@ pub(crate) fn fits((a, first): Meaning, (b, other): Meaning) -> bool {
     same && near(0) && near(1)
 }
 
+/// Whether rasters of one grid have more in common than a row or a column of posts.
+pub(crate) fn overlaps(a: &RasterFrame, b: &RasterFrame) -> bool {
+    let offset = offset(a, b);
+    let in_common = |axis: usize, a: u32, b: u32| {
+        let (low, high) = (offset[axis].max(0), i64::from(a).min(offset[axis] + i64::from(b)));
+        1 < high - low
+    };
+    in_common(0, a.cols, b.cols) && in_common(1, a.rows, b.rows)
+}
+
 /// One raster of several of one grid, the earlier before the later; and how its posts stand.
 pub(crate) fn join(mut rasters: Vec<Raster>) -> Result<(Raster, Vec<Standing>), SourceError> {
     if let [raster] = rasters.as_mut_slice() {

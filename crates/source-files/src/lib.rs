@@ -45,6 +45,8 @@ pub use join::Standing;
 mod mosaic;
 mod warp;
 pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, window_reaching};
+mod edges;
+pub use edges::{EdgeStep, edge_steps};
 mod geoid_file;
 mod windows;
 pub use windows::{Look, Windows};

@@ -9,7 +9,7 @@ use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Resampling};
 
 use crate::crs::Crs;
 use crate::geoid::Shifts;
-use crate::join::{Standing, fits, join};
+use crate::join::{Standing, fits, join, overlaps};
 use crate::samples::{Sample, each};
 use crate::warp::{Place, Warp};
 use crate::{DatumShift, DemFile, Raster, RasterFrame, SourceError};
@@ -32,6 +32,13 @@ pub struct MosaicRules {
     pub feather_m: f64,
     /// What becomes of voids.
     pub voids: MosaicVoids,
+}
+
+impl MosaicRules {
+    /// Whether a raster is kept apart from others of its grid: what is joined cannot fade from one into the next.
+    pub(crate) fn separates<'a>(&self, mut others: impl Iterator<Item = &'a RasterFrame>, frame: &RasterFrame) -> bool {
+        0.0 < self.feather_m && others.any(|other| overlaps(other, frame))
+    }
 }
 
 /// Files of one grid, as one raster.
@@ -96,7 +103,12 @@ impl Mosaic {
         let mut groups: Vec<Vec<Raster>> = Vec::new();
         for raster in rasters {
             match groups.last_mut() {
-                Some(group) if fits(group[0].meaning(), raster.meaning()) => group.push(raster),
+                Some(group)
+                    if fits(group[0].meaning(), raster.meaning())
+                        && !rules.separates(group.iter().map(Raster::frame), &raster.frame) =>
+                {
+                    group.push(raster);
+                }
                 _ => groups.push(vec![raster]),
             }
         }
@@ -371,6 +383,12 @@ impl Corner {
     pub(crate) fn posts(self) -> PostRect {
         let (south, west) = (self.row as i32, self.col as i32);
         PostRect { south, west, north: south + i32::from(0.0 < self.up), east: west + i32::from(0.0 < self.right) }
+    }
+
+    /// The sample there of a raster whose window it is in, whatever is void.
+    pub(crate) fn bilinear(self, raster: &Raster) -> f64 {
+        let wide = raster.window.posts_wide();
+        each!(&raster.samples, posts => View { posts, standings: &[], wide }.bilinear(self).0)
     }
 }
 

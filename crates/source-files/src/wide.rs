@@ -59,7 +59,13 @@ impl WideMosaic {
         let mut groups: Vec<Vec<(usize, f64)>> = Vec::new();
         for &file in used {
             match groups.last_mut() {
-                Some(group) if fits(meaning(group[0].0), meaning(file.0)) => group.push(file),
+                Some(group)
+                    if fits(meaning(group[0].0), meaning(file.0))
+                        && !rules
+                            .separates(group.iter().map(|&(index, _)| &header(index).frame), &header(file.0).frame) =>
+                {
+                    group.push(file);
+                }
                 _ => groups.push(vec![file]),
             }
         }
@@ -82,6 +88,20 @@ impl WideMosaic {
     /// # Errors
     /// When a file cannot be read any more.
     pub fn resample(&self, rect: PostRect) -> Result<Patch, SourceError> {
+        Ok(self.around(rect)?.resample(rect))
+    }
+
+    /// Calls `each` as [`Mosaic::each_own_post`].
+    ///
+    /// # Errors
+    /// As [`WideMosaic::resample`].
+    pub fn each_own_post(&self, rect: PostRect, each: &mut dyn FnMut([f64; 2], f64)) -> Result<(), SourceError> {
+        self.around(rect)?.each_own_post(rect, each);
+        Ok(())
+    }
+
+    /// What lies under a rectangle of the working grid.
+    fn around(&self, rect: PostRect) -> Result<Mosaic, SourceError> {
         let mut layers = Vec::new();
         for joint in &self.joints {
             let Some(window) = joint.warp.window(rect, MARGIN) else { continue };
@@ -94,7 +114,7 @@ impl WideMosaic {
             shift: joint.header.shift.clone(),
         });
         let place = (self.area.clone(), self.grid);
-        Ok(Mosaic { layers, rules: self.rules, place, beyond }.resample(rect))
+        Ok(Mosaic { layers, rules: self.rules, place, beyond })
     }
 
     /// Which posts of a rectangle some file reaches, from headers alone: a post is a height or a gap.

@@ -276,8 +276,8 @@ fn find_levels(
     area: &GamingArea,
     workers: &Workers,
     stop: &AtomicBool,
-) -> Result<Option<String>, GroundError> {
-    let Some(water) = relief.water.as_ref().filter(|water| water.is_unknown()) else { return Ok(None) };
+) -> Result<Vec<String>, GroundError> {
+    let Some(water) = &relief.water else { return Ok(Vec::new()) };
     let tiles: Vec<TileId> = area.tiles.iter().copied().filter(|&tile| water.reaches(area.tiling.rect(tile))).collect();
     let mut all = Soundings::new();
     for tiles in tiles.chunks(1 << 10) {
@@ -288,9 +288,10 @@ fn find_levels(
             .map_err(|error| GroundError::from_schedule(tiles, error))?;
         parts.into_iter().for_each(|part| water::add(&mut all, part));
     }
-    let without = relief.water.as_mut().map_or(0, |water| water.level(&all));
+    let Some(water) = &mut relief.water else { return Ok(Vec::new()) };
+    let without = water.level(&all);
     let told = || format!("{without} bodies of water hold no post with a height and are left as they are");
-    Ok((0 < without).then(told))
+    Ok((0 < without).then(told).into_iter().chain(water.misfit(&all)).collect())
 }
 
 /// Eyes and their range as the scan counts them.

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use job::{Job, Resampling, SourceFile, Voids};
 use schedule::Workers;
-use source_files::{DemFile, Mosaic, Raster, SourceError, VoidPolicy, VoidSummary, window_under};
+use source_files::{DemFile, EdgeStep, Mosaic, Raster, SourceError, VoidPolicy, VoidSummary, edge_steps, window_under};
 
 use crate::ground::area::GamingArea;
 use crate::ground::datums::{Datums, datum_of, judge_datums};
@@ -134,8 +134,26 @@ fn open_mosaic(
     if rasters.is_empty() {
         return Err(nothing_reaches());
     }
+    let steps = edge_steps(&rasters, (&crs, &area.frame, area.rect), 0.0 < job.dem.feather_m);
+    warnings.extend(steps.iter().filter_map(|step| told(step, &rasters)));
     let source = Mosaic::new(rasters, mosaic_rules(job), &crs, &area.frame, area.rect)?;
     Ok(Decoded { source, warnings, accuracy_m, range_m })
+}
+
+/// What a person should know of a step between two rasters: what differs by less is noise of two measurements, or the
+/// ground's own bends.
+fn told(step: &EdgeStep, rasters: &[Raster]) -> Option<String> {
+    const RMS_MAX_M: f64 = 5.0;
+    const BESIDE_TIMES: f64 = 3.0;
+    const POSTS_MIN: u32 = 16;
+    let &EdgeStep { upper, lower, posts, rms_m, beside_m } = step;
+    (RMS_MAX_M.max(BESIDE_TIMES * beside_m) < rms_m && POSTS_MIN <= posts).then(|| {
+        let [upper, lower] = [upper, lower].map(|place| rasters[place].frame().path.display());
+        format!(
+            "{upper} ends in a step of {rms_m:.1} m RMS, beyond which {lower} goes on; dem.feather_m spreads it where \
+             they overlap, and vertical_datum of each says what they are above"
+        )
+    })
 }
 
 fn raster_warnings(raster: &Raster) -> Vec<String> {

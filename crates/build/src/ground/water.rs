@@ -42,11 +42,6 @@ impl Water {
         self.bodies.iter().filter_map(|body| body.level)
     }
 
-    /// Whether levels are still to be found in the heights.
-    pub fn is_unknown(&self) -> bool {
-        self.bodies.iter().any(|body| body.level.is_none())
-    }
-
     /// Whether there is water in a rectangle, as far as can be told from bounds.
     pub fn reaches(&self, rect: PostRect) -> bool {
         self.bodies.iter().any(|body| body.bounds.intersection(&rect).is_some())
@@ -85,6 +80,31 @@ impl Water {
             body.level = soundings.get(&index).and_then(median);
         }
         self.bodies.iter().filter(|body| body.level.is_none()).count()
+    }
+
+    /// What a person should know of bodies over ground that lies far off their level: a lake's shore misses that by
+    /// little, and a polygon that covers land, or a wrong level, by hills.
+    pub fn misfit(&self, soundings: &Soundings) -> Option<String> {
+        const OFF_MAX: u32 = 10 * terrain::QUANTA_PER_METRE as u32;
+        let (mut bodies, mut posts, mut farthest) = (0, 0, 0);
+        for (index, counts) in soundings {
+            let Some(level) = self.bodies[*index].level else { continue };
+            let off = counts.iter().map(|(height, count)| (height.abs_diff(level), *count));
+            let far = off.filter(|(off, _)| OFF_MAX < *off);
+            let (count, most) = far.fold((0, 0), |(sum, most), (off, count)| (sum + count, off.max(most)));
+            if (counts.values().sum::<u64>() / 100).min(100) < count {
+                (bodies, posts, farthest) = (bodies + 1, posts + count, most.max(farthest));
+            }
+        }
+        let told = || {
+            format!(
+                "dem.water: {bodies} of {} bodies of water lie over ground that is more than 10 m off their level: \
+                 {posts} posts, {:.0} m at most; the polygons cover land, or the level is wrong",
+                self.bodies.len(),
+                f64::from(farthest) / f64::from(terrain::QUANTA_PER_METRE)
+            )
+        };
+        (0 < bodies).then(told)
     }
 
     /// The level at every post of a rectangle that lies in water; `None` when there is no water at all. Where bodies

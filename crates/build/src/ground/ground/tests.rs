@@ -110,6 +110,65 @@ fn water_over_four_tiles_lies_at_one_level_and_is_a_class_of_its_own() {
     assert_eq!(stated.importance.weight(Post::new(100, 100)), u16::MAX, "level, whatever it weighs");
 }
 
+/// A raster of one height in metres from an easting on, 500 m higher and deeper than the area.
+fn write_flat(folder: &Path, name: &str, height_m: i32, (origin_east_m, cols): (f64, usize)) {
+    let spacing = Spacing::from_metres(25.0).unwrap();
+    let frame = GridFrame { origin_east_m, origin_north_m: 3_874_500.0, spacing };
+    let heights = |band| Dem::from_fn(band, |_| Some(128 * height_m));
+    let mut file = std::fs::File::create(folder.join(name)).unwrap();
+    write_heights(&mut file, &frame, PostRect::of_size(161, cols), 32611, heights).unwrap();
+}
+
+#[test]
+fn water_far_off_its_level_is_told() {
+    let folder = TempDir::new().unwrap();
+    write_lake(folder.path());
+    write_flat(folder.path(), "dem.tif", 100, (504_500.0, 161));
+    let told = |level: &str| {
+        let dem = format!("sources = [\"dem.tif\"]\nwater = {{ file = \"lake.json\"{level} }}");
+        open(&job(folder.path(), &dem, ""), u64::MAX).unwrap().1.warnings
+    };
+    assert_eq!([told(""), told(", level_m = 95")], [Vec::<String>::new(), Vec::new()]);
+    let [told] = &told(", level_m = 85")[..] else { panic!("one is told") };
+    assert!(told.contains("1 of 1 bodies") && told.contains("4096 posts, 15 m"), "{told}");
+}
+
+#[test]
+fn a_step_where_a_raster_ends_over_another_is_told() {
+    let folder = TempDir::new().unwrap();
+    write_flat(folder.path(), "west.tif", 100, (504_500.0, 81));
+    let told = |height_m: i32, feather: &str| {
+        write_flat(folder.path(), "east.tif", height_m, (506_000.0, 101));
+        let dem = format!("sources = [\"west.tif\", \"east.tif\"]\n{feather}");
+        open(&job(folder.path(), &dem, ""), u64::MAX).unwrap().1.warnings
+    };
+    let found = told(120, "");
+    let [step] = &found[..] else { panic!("one is told: {found:?}") };
+    assert!(step.contains("west.tif ends in a step of 20.0 m RMS"), "{step}");
+    assert_eq!([told(104, ""), told(120, "feather_m = 300")], [Vec::<String>::new(), Vec::new()]);
+    // One that begins a post later has nothing to fade into.
+    let abutting = |height_m: i32| {
+        write_flat(folder.path(), "east.tif", height_m, (506_525.0, 80));
+        let dem = "sources = [\"west.tif\", \"east.tif\"]\nfeather_m = 300";
+        open(&job(folder.path(), dem, ""), u64::MAX).unwrap().1.warnings.len()
+    };
+    assert_eq!([abutting(102), abutting(120)], [0, 1]);
+}
+
+#[test]
+fn rasters_of_one_grid_fade_into_each_other_where_they_overlap() {
+    let folder = TempDir::new().unwrap();
+    write_flat(folder.path(), "west.tif", 100, (504_500.0, 81));
+    write_flat(folder.path(), "east.tif", 120, (506_000.0, 101));
+    let dem = "sources = [\"west.tif\", \"east.tif\"]\nfeather_m = 400";
+    for bytes in [u64::MAX, 0] {
+        let (area, ground) = open(&job(folder.path(), dem, ""), bytes).unwrap();
+        let row = ground.window(area.rect).unwrap().dem.row(100).to_vec();
+        let steepest = row.windows(2).map(|pair| pair[0].abs_diff(pair[1])).max();
+        assert!(steepest < Some(3 * 128), "{steepest:?} quanta from post to post, {bytes} bytes");
+    }
+}
+
 #[test]
 fn steep_ground_is_the_same_from_every_tile_and_matches_a_plain_count() {
     let folder = TempDir::new().unwrap();
