@@ -177,6 +177,7 @@ impl Sums<'_> {
         let length = metres_of_quanta(site.lattice.length(piece.ends[0], piece.ends[1]) as i32);
         let work = self.found.classes.entry(piece.class).or_default();
         work.length_m += length;
+        work.over_holes_m += if is_known { 0.0 } else { length };
         let mut moved = [0.0; 2];
         for off in off {
             count_off(work, off, length / 2.0, piece.limits);
@@ -330,6 +331,19 @@ mod tests {
         ] {
             assert!((0..2).all(|at| 100.0 < sum[at] && (sum[at] - all.moved_m3[at]).abs() < 1e-6), "{sum:?} {all:?}");
         }
+    }
+
+    #[test]
+    fn what_lies_over_a_hole_is_told_and_moves_nothing() {
+        let road = way(1, "highway=primary", &[(10.0, 10.0), (90.0, 10.0)]);
+        let all = AreaFeatures::of(vec![road], &[], 1.5, site(), &in_turn);
+        let ground: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &|_, _| 50.0)).collect();
+        let east = all.stations().iter().map(|place| ground_at(*place, &|east, _| east));
+        let middles: Vec<Option<i32>> = east.map(|east| east.filter(|east| *east < 50 * 128)).collect();
+        let sounded = Sounded { heights: &ground, middles: &middles, inside: &[] };
+        let options = (GradeOptions::USUAL, FallOptions::USUAL);
+        let found = only(&all.level(sounded, options, &Shares::each([8, 8], 1 << 20), &in_turn).earthworks);
+        assert!((390.0..420.0).contains(&found.over_holes_m) && found.moved_m3 == [0.0; 2], "{found:?}");
     }
 
     #[test]

@@ -59,7 +59,9 @@ impl Kind {
             Kind::Buildings => 2,
             // 2: nothing over holes.
             Kind::Profile => 2,
-            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Lines | Kind::Level | Kind::Objects => 1,
+            // 2: what lies over holes.
+            Kind::Level => 2,
+            Kind::Tile | Kind::Curve | Kind::Removals | Kind::Lines | Kind::Objects => 1,
         }
     }
 }

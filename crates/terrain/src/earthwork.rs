@@ -80,4 +80,6 @@ pub struct Earthwork {
     pub over_limit_m: [f64; 2],
     /// Cubic metres cut and filled.
     pub moved_m3: [f64; 2],
+    /// Metres of ways over holes, whose ground is not known: they count as on the ground above.
+    pub over_holes_m: f64,
 }

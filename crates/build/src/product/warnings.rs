@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use job::Job;
-use store::{AreaLevel, FeatureAmounts, ObjectSums, Report, ReportDeckClearance};
+use store::{AreaLevel, FeatureAmounts, FeatureRemark, ObjectSums, Report, ReportDeckClearance};
 
 use crate::product::earthworks;
 
@@ -46,7 +46,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 20] = [
+pub(crate) const MATTERS: [Matter; 22] = [
     matter(
         "files, datums, holes and rules of sources, or metres of the area's system, that are not as they should be",
         Told::OfStage,
@@ -104,6 +104,16 @@ pub(crate) const MATTERS: [Matter; 20] = [
         "polygons of rivers without a line in them that fall too far for a lake",
         Told::Warning(rivers_without_line),
         "nothing says which way they fall: they are outlines in the ground, and no water",
+    ),
+    matter(
+        "outlines of water or of what stands there whose ends do not meet",
+        Told::Warning(open_outlines),
+        "a part of them is left out, and no share of a class knows of it",
+    ),
+    matter(
+        "more than 100 m of ways over holes",
+        Told::Warning(over_holes),
+        "nothing says how high they lie there, and exports leave that ground out",
     ),
     matter("grades that were relaxed", Told::Line, "the surface is drivable, and each is listed in features.geojson"),
     matter(
@@ -182,20 +192,51 @@ fn decks_below(made: &Made) -> Vec<String> {
     below.map(told).collect()
 }
 
+/// How many features have a remark.
+fn features_with(made: &Made, is_meant: impl Fn(&FeatureRemark) -> bool) -> usize {
+    let remarks = made.features.iter().flat_map(|(_, level)| &level.remarks);
+    remarks.filter(|remark| is_meant(remark)).map(|remark| &remark.feature).collect::<BTreeSet<_>>().len()
+}
+
 /// Polygons of rivers are outlines only.
 fn rivers_without_line(made: &Made) -> Vec<String> {
     let outline_only = features::Remedy::OutlineOnly.to_string();
-    let remarks = made.features.iter().flat_map(|(_, level)| &level.remarks);
-    let rivers: BTreeSet<&str> =
-        remarks.filter(|remark| remark.done == outline_only).map(|remark| remark.feature.as_str()).collect();
+    let rivers = features_with(made, |remark| remark.done == outline_only);
     let told = || {
         format!(
-            "polygons of rivers without a line inside that fall too far for a lake: {}; they are breaklines and no \
-             water, see features.geojson, and lines of the rivers beside them make them water",
-            rivers.len()
+            "polygons of rivers without a line inside that fall too far for a lake: {rivers}; they are breaklines and \
+             no water, see features.geojson, and lines of the rivers beside them make them water"
         )
     };
-    (!rivers.is_empty()).then(told).into_iter().collect()
+    (0 < rivers).then(told).into_iter().collect()
+}
+
+/// Outlines are not closed.
+fn open_outlines(made: &Made) -> Vec<String> {
+    let unclosed = features::Flaw::UnclosedRing.to_string();
+    let outlines = features_with(made, |remark| remark.found == unclosed && remark.leaves_out);
+    let told = || {
+        format!(
+            "outlines whose ends do not meet: {outlines}; they are left out, or a part of them, see features.geojson: \
+             a shore of the sea needs a polygon"
+        )
+    };
+    (0 < outlines).then(told).into_iter().collect()
+}
+
+/// Ways lie where nothing is known.
+fn over_holes(made: &Made) -> Vec<String> {
+    const LEAST_M: f64 = 100.0;
+    let works = made.features.iter().flat_map(|(_, level)| &level.earthworks);
+    let metres: f64 = works.map(|(_, work)| work.over_holes_m).sum();
+    let told = || {
+        format!(
+            "{:.1} km of ways lie over holes of the DEM: nothing says how high they are there, and exports leave that \
+             ground out",
+            metres / 1000.0
+        )
+    };
+    (LEAST_M < metres).then(told).into_iter().collect()
 }
 
 /// Bridges would run through hills.
@@ -254,7 +295,7 @@ fn objects_left_out(made: &Made) -> Vec<String> {
         let ObjectSums { kind, wanted, kept, .. } = sums;
         format!(
             "{percent:.1} % of what objects of kind {kind} hide had no room and is left out: {} of {wanted} objects; \
-             tiefort plan tells which [objects.limits] keep them",
+             tiefort plan tells which limits keep them",
             wanted - kept
         )
     };
@@ -285,7 +326,10 @@ fn beyond_sources(made: &Made) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use store::{ReportFeatureChecks, ReportFeatures, ReportHeights};
+    use terrain::Earthwork;
 
     use super::*;
 
@@ -305,6 +349,29 @@ mod tests {
             std::fs::write(path, whole).unwrap();
         }
         assert_eq!(found, table(), "UPDATE_GOLDEN=1 rewrites {path}");
+    }
+
+    #[test]
+    fn open_outlines_and_ways_over_holes_are_told() {
+        let job = Job::from_text("[area]\nname = \"a\"\n[dem]\nsource = \"sample\"\n", Path::new("a.toml")).unwrap();
+        let told = |level: &AreaLevel| {
+            let report = report(Some(ReportFeatureChecks::default()));
+            warnings(&Made { report: &report, features: Some((&job, level)) })
+        };
+        let remark = |leaves_out: bool| FeatureRemark {
+            feature: "way/1".into(),
+            at_m: None,
+            found: features::Flaw::UnclosedRing.to_string(),
+            done: String::new(),
+            leaves_out,
+            degrades: false,
+        };
+        let over = |over_holes_m: f64| vec![(3, Earthwork { over_holes_m, ..Earthwork::default() })];
+        let quiet = AreaLevel { remarks: vec![remark(false)], earthworks: over(99.0), ..AreaLevel::default() };
+        assert_eq!(told(&quiet), Vec::<String>::new());
+        let bad = AreaLevel { remarks: vec![remark(true); 2], earthworks: over(478.0), ..AreaLevel::default() };
+        let [open, holes] = &told(&bad)[..] else { panic!("both are told") };
+        assert!(open.contains("do not meet: 1;") && holes.starts_with("0.5 km of ways"), "{open} {holes}");
     }
 
     #[test]
