@@ -4,11 +4,14 @@ use std::path::{Path, PathBuf};
 
 use crate::CompileError;
 use crate::ground::{GroundError, covered, rectangle_around};
-use source_files::{Crs, DemFile, RasterFrame, Reading, SourceError};
-use terrain::{GridFrame, PostRect, Spacing};
+use source_files::{
+    Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, Reading, SourceError, Standing, WideMosaic, Windows,
+    window_reaching,
+};
+use terrain::{GridFrame, PostRect, Resampling, Spacing};
 
 use crate::workbench::heights::crs_named;
-use crate::workbench::outlook::Sampled;
+use crate::workbench::outlook::{Left, Sampled};
 use crate::workbench::suiting::{area_crs, posts_m, spacing_for};
 
 /// What a raster is.
@@ -64,6 +67,8 @@ pub struct Suggestion {
     pub part_around: Option<[f64; 2]>,
     /// Metres between posts of the finest raster, about.
     pub posts_m: f64,
+    /// Posts of the area between several rasters, which none of them reaches.
+    pub gap_posts: usize,
     looked: Looked,
 }
 
@@ -88,28 +93,59 @@ impl Suggestion {
         cols * rows
     }
 
-    /// The RMS residual that so many triangles of a load module will leave, in metres, from a look at windows of the
-    /// area; `None` where those have no heights.
+    /// The RMS residual that so many triangles of a load module will leave, in metres, at the posts of the source where
+    /// there is one, from a look at windows of the area; `None` where those have no heights.
     ///
     /// # Errors
     /// When a raster cannot be opened or decoded.
     pub fn rms_m(&self, triangles: u32) -> Result<Option<f64>, CompileError> {
-        let Looked { crs, spacing, frames, given } = &self.looked;
+        Ok(self.left(triangles)?.map(|left| left.fit_m.hypot(left.resampled_m)))
+    }
+
+    fn left(&self, triangles: u32) -> Result<Option<Left>, CompileError> {
+        let (grid, rect, side_cells) = self.posts();
+        let Looked { crs, frames, .. } = &self.looked;
+        let sampled = Sampled { crs, grid, rect, side_cells, triangles: triangles as usize };
+        let lowest_m: Vec<f64> = self.seen.iter().map(|seen| seen.range_m.map_or(0.0, |(low, _)| low)).collect();
+        sampled.left(frames, &lowest_m, |index| self.open(index))
+    }
+
+    fn open(&self, index: usize) -> Result<DemFile, CompileError> {
+        let seen = &self.seen[index];
+        Ok(open(&seen.path, self.looked.given.as_deref(), seen.undeclared)?.0)
+    }
+
+    /// The posts of the area, and how many cells a load module has along a side.
+    fn posts(&self) -> (GridFrame, PostRect, usize) {
         let modules = self.size_m.map(|metres| (metres / SIDE_M).round() as usize);
         let side_cells = (SIDE_M / self.spacing_m).round() as usize;
-        let sampled = Sampled {
-            crs,
-            grid: GridFrame { origin_east_m: self.origin_m[0], origin_north_m: self.origin_m[1], spacing: *spacing },
-            rect: PostRect::of_size(modules[1] * side_cells + 1, modules[0] * side_cells + 1),
-            side_cells,
-            triangles: triangles as usize,
-        };
-        let lowest_m: Vec<f64> = self.seen.iter().map(|seen| seen.range_m.map_or(0.0, |(low, _)| low)).collect();
-        let open = |index: usize| {
-            let seen: &Seen = &self.seen[index];
-            Ok(open(&seen.path, given.as_deref(), seen.undeclared)?.0)
-        };
-        sampled.rms_m(frames, &lowest_m, open)
+        let [origin_east_m, origin_north_m] = self.origin_m;
+        let grid = GridFrame { origin_east_m, origin_north_m, spacing: self.looked.spacing };
+        (grid, PostRect::of_size(modules[1] * side_cells + 1, modules[0] * side_cells + 1), side_cells)
+    }
+
+    /// Posts that no raster reaches, from headers alone; of an area too large for that, none.
+    fn count_gaps(&self) -> Result<usize, CompileError> {
+        const POSTS_MAX: usize = 64 << 20;
+        const ROWS: usize = 64;
+        let (grid, rect, _) = self.posts();
+        if POSTS_MAX < rect.post_count() {
+            return Ok(0);
+        }
+        let Looked { crs, frames, .. } = &self.looked;
+        let reaching = (0..frames.len()).filter(|&index| window_reaching(&frames[index], crs, &grid, rect).is_some());
+        let files = reaching.map(|index| self.open(index)).collect::<Result<Vec<_>, _>>()?;
+        let used: Vec<(usize, f64)> = (0..files.len()).map(|index| (index, 0.0)).collect();
+        let voids = MosaicVoids { next_source: true, fill_within: 0 };
+        let rules = MosaicRules { resampling: Resampling::Bilinear, feather_m: 0.0, voids };
+        let mosaic = WideMosaic::new(Windows::new(files, 0), &used, rules, (crs, &grid, rect))?;
+        let strips = (rect.south..=rect.north).step_by(ROWS);
+        let gaps = strips.map(|south| {
+            let north = (south + ROWS as i32 - 1).min(rect.north);
+            let reached = mosaic.reached(PostRect { south, north, ..rect });
+            reached.standings.iter().filter(|standing| **standing == Standing::Gap).count()
+        });
+        Ok(gaps.sum())
     }
 
     /// Triangles of a load module that leave this RMS residual, about: from some looks, between which the logarithm of
@@ -122,8 +158,10 @@ impl Suggestion {
         let mut at = f64::from(TRIANGLES);
         let mut before: Option<[f64; 2]> = None;
         for _ in 0..LOOKS_MAX {
-            let Some(left_m) = self.rms_m(at.round() as u32)?.filter(|left_m| 0.0 < *left_m) else { break };
-            if (left_m / rms_m).ln().abs() < 0.03 {
+            let Some(Left { fit_m: left_m, resampled_m }) = self.left(at.round() as u32)? else { break };
+            // What resampling costs no triangle mends: half of what is asked for is left to the fit at least.
+            let rms_m = (rms_m * rms_m - resampled_m * resampled_m).max(rms_m * rms_m / 4.0).sqrt();
+            if left_m <= 0.0 || (left_m / rms_m).ln().abs() < 0.03 {
                 break;
             }
             // Twice the triangles leave half the residual, until two looks say otherwise.
@@ -207,7 +245,23 @@ pub fn look_at(paths: &[PathBuf], given: Option<&str>) -> Result<Suggestion, Com
     let around = rectangle_around(&frames, &crs).unwrap_or([origin_m; 2]);
     let around_m = [0, 1].map(|axis| (around[1][axis] - around[0][axis]).max(size_m[axis]));
     let looked = Looked { crs, spacing, frames, given: given.map(str::to_owned) };
-    Ok(Suggestion { seen, epsg, origin_m, size_m, around_m, spacing_m, tiles, part_around, posts_m, looked })
+    let mut suggestion = Suggestion {
+        seen,
+        epsg,
+        origin_m,
+        size_m,
+        around_m,
+        spacing_m,
+        tiles,
+        part_around,
+        posts_m,
+        gap_posts: 0,
+        looked,
+    };
+    if 1 < paths.len() {
+        suggestion.gap_posts = suggestion.count_gaps()?;
+    }
+    Ok(suggestion)
 }
 
 /// System, spacing, origin and size of an area in the middle of a raster, and where that middle is; `None` where the

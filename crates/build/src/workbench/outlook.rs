@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 
 use crate::CompileError;
 use source_files::{Crs, DemFile, MosaicRules, MosaicVoids, RasterFrame, WideMosaic, Windows};
-use terrain::{Dem, GridFrame, PostRect, Resampling};
+use terrain::{Dem, GridFrame, Post, PostRect, Resampling};
 
 use crate::workbench::mesh::untiled_together;
 
@@ -23,6 +23,15 @@ const CACHE_BYTES: u64 = 64 << 20;
 /// How much larger the RMS residual of a build is than that of windows without module lines.
 const MODULE_LINES: f64 = 1.03;
 
+/// The RMS residual that a build is expected to leave, in metres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Left {
+    /// Against the working grid: more triangles leave less.
+    pub fit_m: f64,
+    /// Of the working grid against the posts of the one raster, which a finer grid lessens.
+    pub resampled_m: f64,
+}
+
 /// An area that is looked at.
 pub(crate) struct Sampled<'a> {
     pub crs: &'a Crs,
@@ -35,17 +44,17 @@ pub(crate) struct Sampled<'a> {
 }
 
 impl Sampled<'_> {
-    /// The RMS residual in metres that a build of the area is expected to leave; `None` where no window has heights.
-    /// `open` opens the raster at a place of `frames`, whose lowest heights are in `lowest_m`.
+    /// What a build of the area is expected to leave; `None` where no window has heights. `open` opens the raster at a
+    /// place of `frames`, whose lowest heights are in `lowest_m`.
     ///
     /// # Errors
     /// When a file cannot be opened or decoded.
-    pub fn rms_m(
+    pub fn left(
         &self,
         frames: &[RasterFrame],
         lowest_m: &[f64],
         open: impl Fn(usize) -> Result<DemFile, CompileError>,
-    ) -> Result<Option<f64>, CompileError> {
+    ) -> Result<Option<Left>, CompileError> {
         let windows = self.windows();
         let (mut files, mut used) = (Vec::new(), Vec::new());
         for index in self.reaching(frames, &windows) {
@@ -57,10 +66,14 @@ impl Sampled<'_> {
         let place = (self.crs, &self.grid, self.rect);
         let mosaic = WideMosaic::new(Windows::new(files, CACHE_BYTES), &used, rules, place)?;
         let mut grounds: Vec<Dem> = Vec::new();
+        let mut resampled = Squares::default();
         for &window in &windows {
             let dem = mosaic.resample(window)?.dem();
             // What is void weighs nothing, and a window of little else says little of the ground.
             if 2 * dem.void_count() < window.post_count() {
+                // A build of one raster is measured at its own posts, between which the working grid may have its own.
+                mosaic
+                    .each_own_post(window, &mut |place, height_m| resampled.add(&self.grid, &dem, place, height_m))?;
                 grounds.push(dem);
             }
         }
@@ -71,9 +84,14 @@ impl Sampled<'_> {
         let triangles = modules / (self.side_cells * self.side_cells) * self.triangles;
         let spacing_m = self.grid.spacing.metres();
         let residual = untiled_together(&grounds, triangles, spacing_m, &AtomicBool::new(false))?;
-        let rms_m =
-            |posts: u64, squared: u128| (squared as f64 / posts as f64).sqrt() / f64::from(terrain::QUANTA_PER_METRE);
-        Ok(residual.filter(|tally| 0 < tally.posts).map(|tally| MODULE_LINES * rms_m(tally.posts, tally.sum_squared)))
+        let mean_m2 = |posts: u64, squared: u128| {
+            squared as f64 / posts as f64 / f64::from(terrain::QUANTA_PER_METRE * terrain::QUANTA_PER_METRE)
+        };
+        let residual = residual.filter(|tally| 0 < tally.posts);
+        Ok(residual.map(|tally| Left {
+            fit_m: MODULE_LINES * mean_m2(tally.posts, tally.sum_squared).sqrt(),
+            resampled_m: resampled.mean().sqrt(),
+        }))
     }
 
     /// Places of the rasters that hold a corner, the middle of a side or the middle of a window.
@@ -127,6 +145,35 @@ impl Sampled<'_> {
             .flat_map(|row| firsts(cols).map(move |col| (row, col)))
             .map(|(row, col)| window(row, col))
             .collect()
+    }
+}
+
+/// How far the working grid lies off the posts of a raster between its own.
+#[derive(Default)]
+struct Squares {
+    posts: u64,
+    metres_squared: f64,
+}
+
+impl Squares {
+    /// Adds a post at a place in the area's system.
+    fn add(&mut self, grid: &GridFrame, dem: &Dem, [east, north]: [f64; 2], height_m: f64) {
+        let spacing_m = grid.spacing.metres();
+        let (x, y) = ((east - grid.origin_east_m) / spacing_m, (north - grid.origin_north_m) / spacing_m);
+        let (row, col) = (y.floor() as i32, x.floor() as i32);
+        let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(up, right)| Post::new(row + up, col + right));
+        if !corners.iter().all(|post| dem.rect().contains(*post) && !dem.is_void(*post)) {
+            return;
+        }
+        let [a, b, c, d] = corners.map(|post| terrain::metres_of_quanta(dem.height(post)));
+        let (right, up) = (x - x.floor(), y - y.floor());
+        let between = (a * (1.0 - right) + b * right) * (1.0 - up) + (c * (1.0 - right) + d * right) * up;
+        self.posts += 1;
+        self.metres_squared += (between - height_m).powi(2);
+    }
+
+    fn mean(&self) -> f64 {
+        if self.posts == 0 { 0.0 } else { self.metres_squared / self.posts as f64 }
     }
 }
 

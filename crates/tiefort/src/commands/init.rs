@@ -206,9 +206,17 @@ fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), j
     let voids: usize = seen.iter().map(|file| file.voids).sum();
     let files = if seen.len() == 1 { "1 file".to_owned() } else { format!("{} files", seen.len()) };
     let [wide, high] = size_m.map(|metres| metres / 1000.0);
-    let voids = if voids == 0 { "no voids".to_owned() } else { format!("{} void posts", views::grouped(voids as u64)) };
+    let mut voids =
+        if voids == 0 { "no voids".to_owned() } else { format!("{} void posts", views::grouped(voids as u64)) };
+    if 0 < suggestion.gap_posts {
+        voids += &format!(", {} posts of the area that no file reaches", views::grouped(suggestion.gap_posts as u64));
+    }
     let datums = known_datums(seen);
-    let datum = if datums.is_empty() { "an unknown datum".to_owned() } else { datums.join(" and ") };
+    let mut datums: Vec<&str> = datums;
+    if seen.iter().any(|file| file.vertical_datum.is_none()) {
+        datums.push("an unknown datum");
+    }
+    let datum = datums.join(" and ");
     let mut text = format!("found {files}: {wide} x {high} km at {spacing_m} m, {voids}, heights above {datum}");
     if let Some([wide, high]) = left_out_km(suggestion) {
         text += &format!("; {wide} km of the files' width and {high} km of their height are left out");
@@ -264,7 +272,7 @@ fn remarks(suggestion: &Suggestion, triangles: u32) -> Vec<String> {
     /// Posts for a triangle, beyond which more of them change hardly anything.
     const POSTS_A_TRIANGLE_MAX: f64 = 100.0;
     /// Spacings for a post of the source, beyond which the grid repeats what the source says.
-    const COARSE: f64 = 1.5;
+    const COARSE: f64 = 3.5;
     let Suggestion { spacing_m, posts_m, .. } = suggestion;
     let cells = (500.0 / spacing_m).powi(2);
     let mut remarks = Vec::new();
@@ -332,7 +340,7 @@ fn job_text(
         text += &source_text(file, folder, given);
     }
     text += "]\n";
-    text += &voids_text(seen);
+    text += &voids_text(suggestion);
     text += &datum_text(seen);
     text += &features_section(features, folder);
     text += &objects_section(features, &limits.objects, folder);
@@ -412,13 +420,14 @@ fn short(number: f64) -> String {
     format!("{rounded}")
 }
 
-fn voids_text(seen: &[Seen]) -> String {
-    let voids = seen.iter().any(|file| 0 < file.voids);
+fn voids_text(Suggestion { seen, gap_posts, .. }: &Suggestion) -> String {
+    let voids = seen.iter().any(|file| 0 < file.voids) || 0 < *gap_posts;
     let next = if 1 < seen.len() { "next_source = true, " } else { "" };
+    let between = if *gap_posts == 0 { "" } else { "; no file reaches some posts between them" };
     match voids {
         true => format!(
-            "# Small voids are filled from around them, larger ones have no weight;\n\
-             # \"fail\" would refuse both.\n\
+            "# Small voids and the rims of larger ones are filled from around them;\n\
+             # the rest has no weight. \"fail\" would refuse both{between}.\n\
              voids = {{ {next}fill_within_posts = 8, hole = true }}\n"
         ),
         false => "voids = \"fail\"                # there are none\n".to_owned(),

@@ -25,7 +25,8 @@ fn check_rms(scene: &Scene, raster: &str) {
     let told: f64 = told.split(' ').next().unwrap().parse().unwrap();
     scene.run_to(0, &["build", "job.toml", "--out", "x.tdb", "--fresh", "--no-html", "--quiet"]);
     let report: Value = serde_json::from_slice(&fs::read(scene.path("x.tdb/report.json")).unwrap()).unwrap();
-    let built = report["residual"]["rms_m"].as_f64().unwrap();
+    let built =
+        ["residual_against_source", "residual"].into_iter().find_map(|key| report[key]["rms_m"].as_f64()).unwrap();
     assert!(SHARE.contains(&(built / told)), "{raster}: {told} m were told, {built} m were left");
 }
 
@@ -93,6 +94,27 @@ fn ground_finer_than_the_budget_shows_and_a_grid_finer_than_the_ground_are_remar
     write_grid(&scene, 81, 25.0, hills);
     let plain = said(&scene, &["dem.asc"]);
     assert!(!plain.contains("note: "), "{plain}");
+}
+
+#[test]
+fn a_gap_between_rasters_is_told_and_its_job_builds() {
+    let scene = Scene::new();
+    write_grid(&scene, 81, 25.0, hills);
+    let text = fs::read_to_string(scene.path("dem.asc")).unwrap();
+    fs::write(scene.path("east.asc"), text.replace("xllcenter 506000", "xllcenter 508100")).unwrap();
+    fs::copy(scene.path("dem.prj"), scene.path("east.prj")).unwrap();
+    let found = said(&scene, &["dem.asc", "east.asc", "--out", "job.toml"]);
+    assert!(found.contains("no voids, ") && found.contains(" posts of the area that no file reaches"), "{found}");
+    scene.run_to(0, &["build", "job.toml", "--out", "x.tdb"]);
+}
+
+#[test]
+fn posts_far_apart_get_a_finer_grid_and_the_forecast_holds_at_them() {
+    let scene = Scene::new();
+    write_grid(&scene, 41, 75.0, hills);
+    let found = said(&scene, &["dem.asc", "--out", "job.toml"]);
+    assert!(found.contains(" km at 31.25 m,"), "{found}");
+    check_rms(&scene, "dem.asc");
 }
 
 #[test]
