@@ -1,4 +1,4 @@
-//! What a build is expected to take, from its job alone.
+//! What a build is expected to take, from its job alone and the sizes of the files of features that it names.
 //!
 //! The rates are those of one core of a server of 2023: the seconds of processor time of one stage, or the bytes at
 //! its peak, divided by what it goes by. The builds they were measured on have 2501, 5001, 10,001 and 20,001 posts a
@@ -107,6 +107,10 @@ const MEMORY_OPTIMISING: (u64, u64) = (40, 600);
 const MEMORY_GROWING: (u64, u64) = (2, 100);
 /// Bytes of a raster for a post of the area, about.
 const BYTES_PER_SOURCE_POST: u64 = 4;
+
+/// Bytes of memory for a byte of a file of features, OpenStreetMap's or GeoJSON, and the bytes that a square kilometre
+/// of area may have of them: larger files reach beyond it. Measured on six areas of towns and of deserts.
+const MEMORY_FEATURES: (u64, f64) = (60, 10e3);
 
 /// What a build goes by.
 struct Size {
@@ -231,7 +235,14 @@ fn shared_bytes(job: &Job, size: &Size) -> u64 {
         DemSource::Files { .. } => (size.posts * BYTES_PER_SOURCE_POST).min(CACHE_BYTES_MAX + CACHE_BYTES_MAX / 4),
     };
     // Windows that were kept are gone when the page is drawn.
-    MEMORY_BASE + tins + counts + (kept + source).max(page)
+    MEMORY_BASE + tins + counts + (kept + source).max(page) + feature_bytes(job, size)
+}
+
+/// Memory for roads, rivers, lakes and what stands beside them.
+fn feature_bytes(job: &Job, size: &Size) -> u64 {
+    let on_disk = job.features.as_ref().map_or(0, |features| features.bytes_on_disk());
+    let km2 = size.posts as f64 * (job.area.spacing.metres() / 1000.0).powi(2);
+    MEMORY_FEATURES.0 * on_disk.min((MEMORY_FEATURES.1 * km2) as u64)
 }
 
 fn worker_bytes(job: &Job, size: &Size) -> u64 {

@@ -68,6 +68,11 @@ impl FeaturesSpec {
         files
     }
 
+    /// How large the files are; those that cannot be found have no size.
+    pub fn bytes_on_disk(&self) -> u64 {
+        self.files().iter().filter_map(|file| Some(std::fs::metadata(&file.path).ok()?.len())).sum()
+    }
+
     /// Whether a database has a file of buildings: the job wants it, and has a file that may hold some.
     pub fn has_buildings(&self) -> bool {
         self.buildings && self.sources.iter().any(|source| matches!(source, FeatureSource::File { .. }))
