@@ -19,20 +19,25 @@ pub struct EdgeStep {
     pub upper: usize,
     /// The one that goes on.
     pub lower: usize,
-    /// Posts at the edge that tell of it.
-    pub posts: u32,
-    /// How high it is, as RMS in metres.
-    pub rms_m: f64,
-    /// How much the ground beside it bends from post to post, as RMS in metres: no step there is less than noise.
-    pub beside_m: f64,
+    /// How high it is in metres: what heights of both differ by as RMS; where they only abut, what the ground steps by
+    /// on average beyond its own slope.
+    pub height_m: f64,
 }
 
-/// Sums of one step.
+/// Sums of one step: squares where both have heights, and steps where they abut, each with how many posts.
 #[derive(Default)]
 struct Sums {
-    posts: u32,
-    squares: f64,
-    beside: f64,
+    squares: (f64, u32),
+    steps: (f64, u32),
+}
+
+impl Sums {
+    /// How high the step is; few posts say nothing.
+    fn height_m(&self) -> f64 {
+        const POSTS_MIN: u32 = 16;
+        let mean = |(sum, posts): (f64, u32)| if posts < POSTS_MIN { 0.0 } else { sum / f64::from(posts) };
+        mean(self.squares).sqrt().max(mean(self.steps).abs())
+    }
 }
 
 /// The steps between rasters in order of priority that lie in the area `rect`: at every edge of one under which the
@@ -45,7 +50,7 @@ pub fn edge_steps(
 ) -> Vec<EdgeStep> {
     let ([west_m, south_m], [east_m, north_m]) = (grid.place_m(rect.south_west()), grid.place_m(rect.north_east()));
     let is_within = |at: f64, low: f64, high: f64| low <= at && at <= high;
-    let mut sums = BTreeMap::<[usize; 2], Sums>::new();
+    let mut all = BTreeMap::<[usize; 2], Sums>::new();
     for (upper, raster) in rasters.iter().enumerate() {
         for (post, inward) in edge(raster) {
             let along =
@@ -59,29 +64,24 @@ pub fn edge_steps(
                 continue;
             }
             let Some(own) = height(raster, 0) else { continue };
-            let bend = |[a, b, c, d]: [f64; 4]| (c - b) - ((b - a) + (d - c)) / 2.0;
-            let inner = [3, 2, 1, 0].map(|posts| height(raster, posts));
-            let found = (upper + 1..rasters.len()).find_map(|lower| {
-                let other = |posts: i32| height(&rasters[lower], posts);
-                let step = match other(0) {
-                    Some(below) if feathered && other(2).is_some() => return Some((lower, own - below, true)),
-                    Some(below) => own - below,
-                    None => bend([inner[2]?, own, other(-1)?, other(-2)?]),
+            for (lower, other) in (upper + 1..).zip(&rasters[upper + 1..]) {
+                let (sum, by) = match [0, 2, -1, -2].map(|posts| height(other, posts)) {
+                    [Some(_), Some(_), ..] if feathered => break,
+                    [Some(below), ..] => (&mut all.entry([upper, lower]).or_default().squares, (own - below).powi(2)),
+                    [None, _, Some(next), Some(beyond)] => {
+                        let Some(inner) = height(raster, 1) else { break };
+                        let slope = ((own - inner) + (beyond - next)) / 2.0;
+                        (&mut all.entry([upper, lower]).or_default().steps, next - own - slope)
+                    }
+                    _ => continue,
                 };
-                Some((lower, step, false))
-            });
-            let (Some((lower, step, false)), [Some(a), Some(b), Some(c), Some(d)]) = (found, inner) else { continue };
-            let sums = sums.entry([upper, lower]).or_default();
-            sums.posts += 1;
-            sums.squares += step.powi(2);
-            sums.beside += bend([a, b, c, d]).powi(2);
+                *sum = (sum.0 + by, sum.1 + 1);
+                break;
+            }
         }
     }
-    let step = |([upper, lower], Sums { posts, squares, beside }): ([usize; 2], Sums)| {
-        let [rms_m, beside_m] = [squares, beside].map(|squares| (squares / f64::from(posts)).sqrt());
-        EdgeStep { upper, lower, posts, rms_m, beside_m }
-    };
-    sums.into_iter().map(step).collect()
+    let step = |([upper, lower], sums): ([usize; 2], Sums)| EdgeStep { upper, lower, height_m: sums.height_m() };
+    all.into_iter().map(step).collect()
 }
 
 /// The outermost posts of a raster that are in its window, some of them where there are many, each with the step of row

@@ -140,17 +140,13 @@ fn open_mosaic(
     Ok(Decoded { source, warnings, accuracy_m, range_m })
 }
 
-/// What a person should know of a step between two rasters: what differs by less is noise of two measurements, or the
-/// ground's own bends.
-fn told(step: &EdgeStep, rasters: &[Raster]) -> Option<String> {
-    const RMS_MAX_M: f64 = 5.0;
-    const BESIDE_TIMES: f64 = 3.0;
-    const POSTS_MIN: u32 = 16;
-    let &EdgeStep { upper, lower, posts, rms_m, beside_m } = step;
-    (RMS_MAX_M.max(BESIDE_TIMES * beside_m) < rms_m && POSTS_MIN <= posts).then(|| {
-        let [upper, lower] = [upper, lower].map(|place| rasters[place].frame().path.display());
+/// What a person should know of a step between two rasters: what differs by less is noise of two measurements.
+fn told(&EdgeStep { upper, lower, height_m }: &EdgeStep, rasters: &[Raster]) -> Option<String> {
+    const HEIGHT_MAX_M: f64 = 5.0;
+    let [upper, lower] = [upper, lower].map(|place| rasters[place].frame().path.display());
+    (HEIGHT_MAX_M < height_m).then(|| {
         format!(
-            "{upper} ends in a step of {rms_m:.1} m RMS, beyond which {lower} goes on; dem.feather_m spreads it where \
+            "{upper} ends in a step of {height_m:.1} m, beyond which {lower} goes on; dem.feather_m spreads it where \
              they overlap, and vertical_datum of each says what they are above"
         )
     })

@@ -353,7 +353,9 @@ mod tests {
 
     #[test]
     fn open_outlines_and_ways_over_holes_are_told() {
-        let job = Job::from_text("[area]\nname = \"a\"\n[dem]\nsource = \"sample\"\n", Path::new("a.toml")).unwrap();
+        let text = "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [0, 0]\nsize_m = [3000, 3000]\n\
+                    spacing_m = 12.5\n[dem]\nsource = \"sample\"\n";
+        let job = Job::from_text(text, Path::new("a.toml")).unwrap();
         let told = |level: &AreaLevel| {
             let report = report(Some(ReportFeatureChecks::default()));
             warnings(&Made { report: &report, features: Some((&job, level)) })

@@ -112,7 +112,7 @@ fn a_gap_between_rasters_is_told_and_its_job_builds() {
 fn posts_far_apart_get_a_finer_grid_and_the_forecast_holds_at_them() {
     let scene = Scene::new();
     write_grid(&scene, 41, 75.0, hills);
-    let found = said(&scene, &["dem.asc", "--out", "job.toml"]);
+    let found = said(&scene, &["dem.asc", "--out", "first.toml"]);
     assert!(found.contains(" km at 31.25 m,"), "{found}");
     check_rms(&scene, "dem.asc");
 }

@@ -144,7 +144,7 @@ fn a_step_where_a_raster_ends_over_another_is_told() {
     };
     let found = told(120, "");
     let [step] = &found[..] else { panic!("one is told: {found:?}") };
-    assert!(step.contains("west.tif ends in a step of 20.0 m RMS"), "{step}");
+    assert!(step.contains("west.tif ends in a step of 20.0 m,"), "{step}");
     assert_eq!([told(104, ""), told(120, "feather_m = 300")], [Vec::<String>::new(), Vec::new()]);
     // One that begins a post later has nothing to fade into.
     let abutting = |height_m: i32| {
