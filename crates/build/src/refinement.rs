@@ -88,13 +88,14 @@ impl Refinement {
         // A largest residual is asked of every post alike.
         let even = self.guard().map(|_| evened(weighted));
         let chosen = even.as_ref().unwrap_or(weighted);
+        let weighs_alike = even.is_none() || is_even(weighted);
         let in_squares = in_squares.or(even.as_ref().map(|_| weighted));
         let optimised = |own: &Self| {
             let mut task = own.beyond_budget(optimising);
-            if let (Rule::LargestSquares { guard }, false) = (&mut task.rule, is_even(weighted)) {
+            if let (Rule::LargestSquares { guard }, false) = (&mut task.rule, weighs_alike) {
                 *guard = None;
             }
-            let grown = grown(&task, if is_even(weighted) { chosen } else { weighted });
+            let grown = grown(&task, if weighs_alike { chosen } else { weighted });
             let task = own.optimisation(optimising, grown.initial_count, &window.forbidden);
             let task = Task { in_squares: in_squares.cloned(), ..task };
             let optimised = optimise(&window.dem, chosen, &grown.tin, &task);
@@ -292,8 +293,7 @@ fn evened(importance: &Importance) -> Importance {
 fn is_even(importance: &Importance) -> bool {
     let rect = importance.rect();
     let mut weights = rect.posts().map(|post| importance.weight(post)).filter(|weight| 0 < *weight);
-    let first = importance.uniform_weight().or_else(|| weights.next());
-    importance.uniform_weight().is_some() || weights.all(|weight| Some(weight) == first)
+    importance.uniform_weight().is_some() || weights.next().is_none_or(|first| weights.all(|weight| weight == first))
 }
 
 /// The DEM with the heights of the seeds.

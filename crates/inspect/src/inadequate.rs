@@ -96,8 +96,9 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     let rms_m = (totals.residual_sum_squared as f64 / totals.residual_posts.max(1) as f64).sqrt();
     let tolerance_m = tolerance_m.unwrap_or(3.0 * rms_m / f64::from(terrain::QUANTA_PER_METRE));
     // What roads that had no room weigh beyond that says nothing of the ground beside them.
-    let natural = ground.natural(area.rect)?.importance;
-    let heaviest = heaviest(&natural, job.dem.water.as_ref().map(|water| water.class));
+    let natural = job.features.as_ref().map(|_| ground.natural(area.rect)).transpose()?;
+    let heaviest =
+        heaviest(&natural.as_ref().unwrap_or(&window).importance, job.dem.water.as_ref().map(|water| water.class));
     let residual_m = weighted(modules.values(), &area, &window, heaviest);
     let counts: Vec<u32> = modules.values().map(|module| job.counted(module)).collect();
     let mut refused = BTreeSet::new();

@@ -7,6 +7,7 @@
 use terrain::geometry::resample::{TAP_UNITS, rounded};
 use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Resampling};
 
+use crate::chunk::Meaning;
 use crate::crs::Crs;
 use crate::geoid::Shifts;
 use crate::join::{Standing, fits, join, overlaps};
@@ -35,9 +36,10 @@ pub struct MosaicRules {
 }
 
 impl MosaicRules {
-    /// Whether a raster is kept apart from others of its grid: what is joined cannot fade from one into the next.
-    pub(crate) fn separates<'a>(&self, mut others: impl Iterator<Item = &'a RasterFrame>, frame: &RasterFrame) -> bool {
-        0.0 < self.feather_m && others.any(|other| overlaps(other, frame))
+    /// Whether a raster becomes one with others: it continues their grid, and is not to fade into one of them.
+    pub(crate) fn joins<'a>(&self, mut others: impl Iterator<Item = Meaning<'a>>, raster: Meaning) -> bool {
+        let fades = |other: Meaning| 0.0 < self.feather_m && overlaps(other.0, raster.0);
+        others.next().is_some_and(|first| fits(first, raster) && !fades(first)) && !others.any(fades)
     }
 }
 
@@ -103,12 +105,7 @@ impl Mosaic {
         let mut groups: Vec<Vec<Raster>> = Vec::new();
         for raster in rasters {
             match groups.last_mut() {
-                Some(group)
-                    if fits(group[0].meaning(), raster.meaning())
-                        && !rules.separates(group.iter().map(Raster::frame), &raster.frame) =>
-                {
-                    group.push(raster);
-                }
+                Some(group) if rules.joins(group.iter().map(Raster::meaning), raster.meaning()) => group.push(raster),
                 _ => groups.push(vec![raster]),
             }
         }

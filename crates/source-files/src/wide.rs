@@ -7,7 +7,7 @@ use terrain::{GridFrame, PostRect, QUANTA_PER_METRE};
 
 use crate::chunk::Header;
 use crate::crs::Crs;
-use crate::join::{Extent, common_kind, fits, offset, shifted};
+use crate::join::{Extent, common_kind, offset, shifted};
 use crate::mosaic::{Beyond, Corner, Layer, MARGIN};
 use crate::samples::{Samples, union};
 use crate::warp::Warp;
@@ -59,11 +59,7 @@ impl WideMosaic {
         let mut groups: Vec<Vec<(usize, f64)>> = Vec::new();
         for &file in used {
             match groups.last_mut() {
-                Some(group)
-                    if fits(meaning(group[0].0), meaning(file.0))
-                        && !rules
-                            .separates(group.iter().map(|&(index, _)| &header(index).frame), &header(file.0).frame) =>
-                {
+                Some(group) if rules.joins(group.iter().map(|&(index, _)| meaning(index)), meaning(file.0)) => {
                     group.push(file);
                 }
                 _ => groups.push(vec![file]),

@@ -211,8 +211,7 @@ fn found_text(suggestion: &Suggestion, (triangles, rms_m): (u32, Option<f64>), j
     if 0 < suggestion.gap_posts {
         voids += &format!(", {} posts of the area that no file reaches", views::grouped(suggestion.gap_posts as u64));
     }
-    let datums = known_datums(seen);
-    let mut datums: Vec<&str> = datums;
+    let mut datums = known_datums(seen);
     if seen.iter().any(|file| file.vertical_datum.is_none()) {
         datums.push("an unknown datum");
     }
@@ -423,11 +422,11 @@ fn short(number: f64) -> String {
 fn voids_text(Suggestion { seen, gap_posts, .. }: &Suggestion) -> String {
     let voids = seen.iter().any(|file| 0 < file.voids) || 0 < *gap_posts;
     let next = if 1 < seen.len() { "next_source = true, " } else { "" };
-    let between = if *gap_posts == 0 { "" } else { "; no file reaches some posts between them" };
+    let between = if *gap_posts == 0 { "" } else { "# No file reaches some posts between them.\n" };
     match voids {
         true => format!(
             "# Small voids and the rims of larger ones are filled from around them;\n\
-             # the rest has no weight. \"fail\" would refuse both{between}.\n\
+             # the rest has no weight. \"fail\" would refuse both.\n{between}\
              voids = {{ {next}fill_within_posts = 8, hole = true }}\n"
         ),
         false => "voids = \"fail\"                # there are none\n".to_owned(),
