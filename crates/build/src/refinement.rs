@@ -277,7 +277,7 @@ pub(crate) fn give(task: &mut TileTask, given: &[GivenPost], rect: PostRect) {
 }
 
 /// The same weight wherever there is one.
-fn evened(importance: &Importance) -> Importance {
+pub(crate) fn evened(importance: &Importance) -> Importance {
     let even = |weight: u16| if weight == 0 { 0 } else { THOUSANDTHS };
     let rect = importance.rect();
     match importance.uniform_weight() {

@@ -14,7 +14,7 @@ use tin::{Frame, SurveyTask, TileTask};
 
 use crate::curves::{Curves, Profile};
 use crate::ground::Window;
-use crate::refinement::{give, optimising};
+use crate::refinement::{evened, give, optimising};
 use crate::run::{ALGORITHM_REVISION, Run};
 use crate::tasks::{is_surveyed, is_surveyed_in_haste, survey_task};
 use crate::{CompileError, Event, Progress, Stage, keys};
@@ -96,7 +96,10 @@ impl Artifact for Surveying<'_> {
 
     fn make(&self, _key: &Key, stamp: &Stamp) -> Result<(Stamp, GainCurve), CompileError> {
         let Self { run, window, task } = *self;
-        let curve = tin::survey(&window.dem, &window.importance, task, terrain::geometry::widest_level());
+        // A largest residual is asked of every post alike.
+        let even = (task.growth.stop.value.and(optimising(run.job))).map(|_| evened(&window.importance));
+        let importance = even.as_ref().unwrap_or(&window.importance);
+        let curve = tin::survey(&window.dem, importance, task, terrain::geometry::widest_level());
         run.database.write_curve(stamp, &curve)?;
         Ok((*stamp, curve))
     }

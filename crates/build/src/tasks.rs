@@ -19,8 +19,8 @@ use crate::refinement::{Most, Refinement, optimising};
 const SURVEY_REACH: u64 = 6;
 /// The same, for a quick look: few tiles deserve more, and a fast build does not wait for them.
 const SURVEY_REACH_OF_FAST: u64 = 3;
-/// The same, where an RMS residual is asked for that optimising reaches within the budget and selection alone does not.
-const SURVEY_REACH_TO_RMS: u64 = 10;
+/// The same, where a residual is asked for: tiles differ most in what they take to it.
+const SURVEY_REACH_TO_RESIDUAL: u64 = 10;
 
 /// The refinement of one tile, optimised if the job says so.
 pub fn tile_refinement(
@@ -107,7 +107,7 @@ pub fn is_surveyed(job: &Job) -> bool {
 /// Whether the survey may be coarse: what it misjudges costs a fast build less than looking closer would.
 pub(crate) fn is_surveyed_in_haste(job: &Job) -> bool {
     let is_fast = optimising(job).is_some_and(|optimising| optimising.effort == Effort::Fast);
-    is_fast && job.tin.target_rms_m.is_none()
+    is_fast && job.tin.target_rms_m.is_none() && job.tin.max_residual_m.is_none()
 }
 
 fn is_by_squares(job: &Job) -> bool {
@@ -150,7 +150,8 @@ fn largest_value(job: &Job) -> Option<u64> {
 pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: &Features) -> SurveyTask {
     let modules = area.tiling.modules(tile, area.grid);
     let reach = match optimising(job) {
-        Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RMS,
+        Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RESIDUAL,
+        _ if job.tin.max_residual_m.is_some() => SURVEY_REACH_TO_RESIDUAL,
         Some(_) if is_surveyed_in_haste(job) => SURVEY_REACH_OF_FAST,
         _ if job.tin.budget == PointBudget::Limits => SURVEY_REACH.min(reach_of_windows(area, modules)),
         _ => SURVEY_REACH,
@@ -166,16 +167,22 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: 
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
     growth.seams = with_outer_sides(job, area, tile, area.tiling.shared_sides(tile));
     growth.barred = features.barred_posts(growth.rect);
+    let largest = largest_in_survey(job);
     // An RMS of 0 is never reached, but has the sums of squares recorded.
-    growth.stop = Stop { points, value: None, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
-    if let Rule::Batches { .. } = growth.rule {
-        growth.rule = Rule::WorstFirst;
-    }
-    if let Rule::LargestSquares { guard } = &mut growth.rule {
-        *guard = None;
-    }
+    growth.stop = Stop { points, value: largest, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
+    growth.rule = match growth.rule {
+        Rule::LargestSquares { .. } if largest.is_none() => Rule::LargestSquares { guard: None },
+        _ => Rule::WorstFirst,
+    };
     let owned = with_outer_sides(job, area, tile, area.tiling.owned_sides(tile));
     SurveyTask { growth, owned, grid: area.grid, cost }
+}
+
+/// The largest residual at which a survey ends: where it ends the choosing and no RMS residual does, a tile gets what
+/// worst posts take to it, and no gain in squares takes that from another.
+fn largest_in_survey(job: &Job) -> Option<u64> {
+    let is_batched = matches!(job.tin.method, Method::Paper { .. });
+    largest_value(job).filter(|_| job.tin.target_rms_m.is_none() && !is_batched)
 }
 
 /// How many halves of an equal share the limit of windows lets a tile come to, where it is twice as large as they are:
