@@ -47,11 +47,21 @@ pub(crate) fn assemble_tile(
     removed: &[Vec<LatticePoint>],
     tile: TileId,
 ) -> Result<Outcome<(Assembled, Sums)>, CompileError> {
-    let features = run.tile_features(tile)?;
     let objects = run.outlines.as_ref().map(|(_, outlines)| TileObjects::of(outlines, &run.area, tile));
-    let left_out = (&*features, run.left_out());
-    let modules = keys::modules((run.job, &run.area), stamps, removed, left_out, objects.as_ref()).fingerprint();
+    let modules = made_from(run, stamps, removed, tile, objects.as_ref())?;
     keep_or_make(&Assembling { run, stamps, removed, tile, objects, modules }, ALGORITHM_REVISION)
+}
+
+/// Of all that the load modules of a tile are made from.
+fn made_from(
+    run: &Run,
+    stamps: &StampOf,
+    removed: &[Vec<LatticePoint>],
+    tile: TileId,
+    objects: Option<&TileObjects>,
+) -> Result<Fingerprint, CompileError> {
+    let left_out = (&*run.tile_features(tile)?, run.left_out());
+    Ok(keys::modules((run.job, &run.area), stamps, removed, left_out, objects).fingerprint())
 }
 
 /// A tile's load modules and what is measured of them, as the engine asks for them.
@@ -227,11 +237,21 @@ fn heights_of(levels: &[Vec<LoadModule>]) -> (i32, i32) {
     heights.fold((i32::MAX, i32::MIN), |(low, high), z| (low.min(z), high.max(z)))
 }
 
-/// The published load modules of a tile as they are: their own numbers, and residuals against today's ground.
-pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Result<(Assembled, Sums), CompileError> {
+/// The published load modules of a tile as they are: their own numbers, and residuals against today's ground. `None`
+/// where they were made from another TIN, or from what features or objects were then.
+pub(crate) fn read_assembled(
+    run: &Run,
+    tins: &[Published],
+    tile: TileId,
+) -> Result<Option<(Assembled, Sums)>, CompileError> {
     let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
     let manifest = run.previous.as_ref().expect("a tile is run again only where a build has ended");
-    let (_, mut levels) = folder.read_levels(manifest, tile)?;
+    let (header, mut levels) = folder.read_levels(manifest, tile)?;
+    let objects = run.outlines.as_ref().map(|(_, outlines)| TileObjects::of(outlines, area, tile));
+    let none = vec![Vec::new(); tins.len()];
+    if header.fingerprint != made_from(run, &|index| tins[index].stamp, &none, tile, objects.as_ref())? {
+        return Ok(None);
+    }
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let (modules, coarser) = numbers_of(&levels);
     let residuals = fidelity::measure(&mut levels[0], &window.measured(area));
@@ -242,7 +262,7 @@ pub(crate) fn read_assembled(run: &Run, tins: &[Published], tile: TileId) -> Res
     let measured = folder.stamp_file(&folder.measured_path(tile))?;
     let done = Assembled { file, measured, modules, coarser };
     let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));
-    Ok((done, Sums { features, ..sums(residuals, at_source, counted, ground) }))
+    Ok(Some((done, Sums { features, ..sums(residuals, at_source, counted, ground) })))
 }
 
 /// Numbers of the finest level, and of each of the others.

@@ -135,7 +135,7 @@ pub(crate) fn open_with<'a>(
     }
     let (database, previous) = lock(&database_area(job), &records)?;
     let Options { page, stop, .. } = *options;
-    Ok(Run {
+    let mut run = Run {
         job,
         area,
         ground,
@@ -150,7 +150,9 @@ pub(crate) fn open_with<'a>(
         read: OnceLock::new(),
         level: None,
         outlines: None,
-    })
+    };
+    run.reserve();
+    Ok(run)
 }
 
 /// The finished database in `folder`, if a build of `job` would change nothing in it: made from the same job and the

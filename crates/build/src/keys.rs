@@ -200,7 +200,7 @@ pub(crate) fn level(
 }
 
 /// Rises whenever the same features may come to something else, or are written otherwise.
-const LEVEL_REVISION: u64 = 3;
+const LEVEL_REVISION: u64 = 4;
 
 fn feed_features(builder: FingerprintBuilder, features: &Features) -> FingerprintBuilder {
     let Features { steps_per_post, vertices, edges, spans } = features;

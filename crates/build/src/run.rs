@@ -13,7 +13,8 @@ use schedule::{Event as Scheduled, RankedTasks, Workers, in_rank_order_observed}
 use source_files::FileState;
 use store::engine::{Cause, FingerprintBuilder, Outcome, Stamp};
 use store::{AreaLevel, AreaOutlines, Database, DatabaseError, FileStamp, Folder, Manifest, RUN_DIGITS, SourceRecord};
-use terrain::{POINT_COST, Refusal, TileFeatures, TileId, TileTin, Vertex};
+use terrain::{ModuleId, POINT_COST, Post, Refusal, TileFeatures, TileId, TileTin, Vertex};
+use tin::tiling::{Budget, outer_border_posts, outer_sides};
 
 use crate::ground::{GamingArea, Ground, Window};
 use crate::left_out::LeftOut;
@@ -21,7 +22,7 @@ use crate::read_features::ReadFeatures;
 use crate::{Clock, CompileError, Event, Progress, Stage};
 
 /// Rises whenever the result of any stage may change for the same input; a test with golden hashes holds it.
-pub const ALGORITHM_REVISION: u32 = 18;
+pub const ALGORITHM_REVISION: u32 = 19;
 
 /// What a run needs from its caller.
 #[derive(Clone, Copy)]
@@ -158,14 +159,14 @@ impl Run<'_> {
         }
         let left_out = LeftOut::of(self.job, &self.area, &level);
         self.level = Some(Settled { file, level, left_out });
-        self.area.budget.reserved = self.reserved();
+        self.reserve();
     }
 
     /// From now on it is decided what stands on the ground, and what of it counts in the limits is taken from them.
     pub fn stand(&mut self, file: FileStamp, outlines: AreaOutlines) {
         self.read = OnceLock::new();
         self.outlines = Some((file, Arc::new(outlines)));
-        self.area.budget.reserved = self.reserved();
+        self.reserve();
     }
 
     /// Triangles of each load module that features take, row by row; empty without features.
@@ -181,13 +182,27 @@ impl Run<'_> {
         outlines.map_or_else(Vec::new, |(_, outlines)| outlines.counts(self.area.grid))
     }
 
-    fn reserved(&self) -> Vec<u32> {
-        let (features, objects) = (self.reserved_by_features(), self.joint_objects());
-        match (features.is_empty(), objects.is_empty()) {
-            (_, true) => features,
-            (true, false) => objects,
-            (false, false) => features.iter().zip(objects).map(|(&features, objects)| features + objects).collect(),
+    /// Takes from the limits what is decided already: features, objects, and points of a job on a fixed outer border,
+    /// which stay where they do not fit and are a breach then.
+    pub(crate) fn reserve(&mut self) {
+        let (area, job) = (&self.area, self.job);
+        let reserved = both(self.reserved_by_features(), self.joint_objects());
+        let mut border = outer_border_posts(area.rect, outer_sides(area.rect, area.rect), job.outer_step_cells());
+        border.sort_unstable();
+        let (grid, side) = (area.grid, area.grid.side_cells);
+        let is_corner = |post: &Post| post.row % side == 0 && post.col % side == 0;
+        let is_more = |post: &Post| !is_corner(post) && border.binary_search(post).is_err();
+        let mut given = Vec::new();
+        for post in self.ground.given_outer_posts().filter(is_more) {
+            let [row, col] = [(post.row, grid.rows), (post.col, grid.cols)].map(|(at, count)| {
+                // What lies on the far border has no load module beyond it.
+                ((at / side) as u32).min(count - 1)
+            });
+            given.resize(grid.count(), 0);
+            given[grid.index(ModuleId { row, col })] += 1;
         }
+        let with_given = Budget { reserved: both(reserved.clone(), given), ..area.budget.clone() };
+        self.area.budget.reserved = if with_given.check().is_ok() { with_given.reserved } else { reserved };
     }
 
     /// What coarser levels leave out of features, in jobs where they do.
@@ -234,6 +249,15 @@ impl Run<'_> {
     /// The ground of a tile.
     pub fn window(&self, tile: TileId) -> Result<Arc<Window>, CompileError> {
         Ok(self.ground.tile(&self.area, tile)?)
+    }
+}
+
+/// Sums of what is counted in each load module, of which either may be empty.
+fn both(first: Vec<u32>, second: Vec<u32>) -> Vec<u32> {
+    match (first.is_empty(), second.is_empty()) {
+        (_, true) => first,
+        (true, false) => second,
+        (false, false) => first.iter().zip(second).map(|(first, second)| first + second).collect(),
     }
 }
 

@@ -19,8 +19,10 @@ use crate::refinement::{Most, Refinement, optimising};
 const SURVEY_REACH: u64 = 6;
 /// The same, for a quick look: few tiles deserve more, and a fast build does not wait for them.
 const SURVEY_REACH_OF_FAST: u64 = 3;
-/// The same, where a residual is asked for: tiles differ most in what they take to it.
-const SURVEY_REACH_TO_RESIDUAL: u64 = 10;
+/// The same, where an RMS residual is asked for that optimising reaches within the budget and selection alone does not.
+const SURVEY_REACH_TO_RMS: u64 = 10;
+/// The same, where a largest residual ends the survey, which goes no further than that takes.
+const SURVEY_REACH_TO_LARGEST: u64 = 40;
 
 /// The refinement of one tile, optimised if the job says so.
 pub fn tile_refinement(
@@ -149,9 +151,10 @@ fn largest_value(job: &Job) -> Option<u64> {
 /// The survey of one tile: all it would select if it were alone.
 pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: &Features) -> SurveyTask {
     let modules = area.tiling.modules(tile, area.grid);
+    let largest = largest_in_survey(job);
     let reach = match optimising(job) {
-        Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RESIDUAL,
-        _ if job.tin.max_residual_m.is_some() => SURVEY_REACH_TO_RESIDUAL,
+        _ if largest.is_some() => SURVEY_REACH_TO_LARGEST,
+        Some(_) if job.tin.target_rms_m.is_some() => SURVEY_REACH_TO_RMS,
         Some(_) if is_surveyed_in_haste(job) => SURVEY_REACH_OF_FAST,
         _ if job.tin.budget == PointBudget::Limits => SURVEY_REACH.min(reach_of_windows(area, modules)),
         _ => SURVEY_REACH,
@@ -162,12 +165,11 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: 
         PointBudget::Limits => (None, CostUnit::Triangles),
     };
     let room = area.budget.area - area.budget.start_total();
-    let allowance = survey_allowance(area, modules, share(room) as u32);
+    let allowance = survey_allowance(area, modules, share(room).min(u32::MAX.into()) as u32);
     let budget = TileBudget { points, allowance: Some(allowance), rms_quanta: None };
     let mut growth = tile_task(job, area, tile, &budget, Vec::new());
     growth.seams = with_outer_sides(job, area, tile, area.tiling.shared_sides(tile));
     growth.barred = features.barred_posts(growth.rect);
-    let largest = largest_in_survey(job);
     // An RMS of 0 is never reached, but has the sums of squares recorded.
     growth.stop = Stop { points, value: largest, rms_quanta: job.tin.target_rms_m.map(|_| 0.0) };
     growth.rule = match growth.rule {

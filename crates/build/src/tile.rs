@@ -104,7 +104,8 @@ pub fn rebuild_tile(
     Ok(Rebuilt { report, frozen: frozen.contains(&tile), rebuilt, database })
 }
 
-/// Assembles the tiles that were refined again and reads the others as they are published.
+/// Assembles the tiles that were refined again and those in which features or objects are not what they were, as a
+/// building on the line between two tiles that stands on the ground of both; reads the others as they are published.
 fn reassemble(
     run: &Run,
     tins: &[Published],
@@ -113,12 +114,10 @@ fn reassemble(
 ) -> Result<(Vec<Assembled>, Sums), CompileError> {
     let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
-        // A building on the line between two tiles stands on the ground of both.
-        let is_beside = |other: TileId| run.job.objects.is_some() && run.area.tiling.neighbours(tile).contains(&other);
-        let is_reached = reached.iter().any(|&(other, _)| other == tile || is_beside(other));
-        let done = match is_reached {
-            true => assemble_tile(run, &|index| tins[index].stamp, &none, tile)?,
-            false => Outcome::Kept(read_assembled(run, tins, tile)?),
+        let is_reached = reached.iter().any(|&(other, _)| other == tile);
+        let done = match if is_reached { None } else { read_assembled(run, tins, tile)? } {
+            Some(read) => Outcome::Kept(read),
+            None => assemble_tile(run, &|index| tins[index].stamp, &none, tile)?,
         };
         Ok(done.map(|(assembled, sums)| {
             adding.add(sums);
@@ -234,6 +233,26 @@ fn as_built<'a>(run: &'a Run, shares: &Shares, tins: &[Published], tile: TileId)
     Refining::new(run, &shares.tiles[run.area.tiling.index(tile)], seeds(run, tins, tile)?, tile)
 }
 
+/// The same, with no more triangles than other tiles leave of the area's as they are now: where features have changed,
+/// those took what a share of another budget was.
+fn beside_others<'a>(
+    run: &'a Run,
+    shares: &Shares,
+    tins: &[Published],
+    tile: TileId,
+) -> Result<Refining<'a>, CompileError> {
+    let (budget, index) = (&run.area.budget, run.area.tiling.index(tile));
+    let mut share = shares.tiles[index].clone();
+    if let Some(allowance) = &mut share.allowance {
+        let mut taken = budget.start_total();
+        for other in tins.iter().filter(|other| other.tile != tile) {
+            taken += u64::from(run.tin(other.tile, &other.stamp)?.triangles_charged);
+        }
+        allowance.triangles = u64::from(allowance.triangles).min(budget.area.saturating_sub(taken)) as u32;
+    }
+    Refining::new(run, &share, seeds(run, tins, tile)?, tile)
+}
+
 /// Publishes a TIN in place of the one that was there.
 fn publish_again(refining: &Refining, tin: TileTin) -> Result<Published, CompileError> {
     let key = refining.key();
@@ -251,7 +270,7 @@ fn rerun(
 ) -> Result<Vec<(TileId, bool)>, CompileError> {
     progress.tell(Event::Started(Stage::Refine, tile));
     let index = run.area.tiling.index(tile);
-    let mut refining = as_built(run, shares, tins, tile)?;
+    let mut refining = beside_others(run, shares, tins, tile)?;
     let mut tin = refining.refine();
     let before = outgoing(run, &*run.tin(tile, &tins[index].stamp)?)?;
     let is_frozen = outgoing(run, &tin)? != before;
@@ -315,7 +334,7 @@ fn cascade(
     while let Some((_, tile)) = waiting.pop_first() {
         progress.tell(Event::Started(Stage::Refine, tile));
         let index = tiling.index(tile);
-        let refining = as_built(run, shares, tins, tile)?;
+        let refining = beside_others(run, shares, tins, tile)?;
         let done = refining.refine();
         let before = run.tin(tile, &tins[index].stamp)?;
         let features = run.tile_features(tile)?;

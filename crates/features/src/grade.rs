@@ -5,6 +5,8 @@
 //! never do. A first fit tells noise from ground; what it lies far from is cut off, the rest is smoothed where it is
 //! noisy, and a second fit has the last word.
 
+use std::collections::BTreeMap;
+
 use crate::decks::{Clearances, Water, raise_sagging_ends, straighten};
 use crate::fit::{Problem, Tie, fit};
 use crate::forest::{Range, Sample};
@@ -69,16 +71,34 @@ pub fn grade(
     assert_eq!([count; 2], [ground.len(), middle.len()], "every node has a height of the ground, or none");
     let mut resting: Vec<Option<i32>> =
         network.nodes.iter().zip(ground).map(|(node, ground)| ground.filter(|_| node.on_ground)).collect();
-    // A bridge that no road leads to stands on the ground below it.
-    network.give_heights(&mut resting, &|node| ground[node as usize]);
+    // A bridge that no road leads to stands on the ground below it, a tunnel lies below all of the ground over it.
+    let bored = bored(network, ground, options.clearances);
+    network.give_heights(&mut resting, &|node| bored[node as usize]);
     raise_sagging_ends(network, &mut resting, options.bank);
     let pins = one_a_node(network, pins, remarks);
     let mut swept = lay(network, [&resting, middle], &pins, options);
     straighten(network, &swept.costs, &mut swept.heights);
-    clear(network, &mut swept, water, options.clearances, remarks);
+    clear(network, &mut swept, ground, water, options.clearances, remarks);
     remark_steep(network, &swept.heights, &|edge| network.relaxed_max(edge), remarks);
     Remark::sort(remarks);
     swept.heights
+}
+
+/// The ground at every node, inside tunnels the lowest of their part of the network, less what a railway needs.
+fn bored(network: &Network, ground: &[Option<i32>], clearances: Clearances) -> Vec<Option<i32>> {
+    let parts = network.parts();
+    let mut lowest: BTreeMap<u32, i32> = BTreeMap::new();
+    for (part, ground) in parts.iter().zip(ground) {
+        if let Some(ground) = *ground {
+            let lowest = lowest.entry(*part).or_insert(ground);
+            *lowest = ground.min(*lowest);
+        }
+    }
+    let height = |node: usize| match lowest.get(&parts[node]) {
+        Some(lowest) if network.is_in_tunnel(node as u32) => Some(lowest - clearances.rail),
+        _ => ground[node],
+    };
+    (0..ground.len()).map(height).collect()
 }
 
 /// Fits heights to the ground at nodes that rest on it, twice, within limits below the lower and above the higher of it
@@ -245,6 +265,26 @@ mod tests {
         let (network, found, _) = heights(bridge("highway=primary tunnel=yes"), hill);
         assert_eq!(at(&network, &found, 40.0, 20.0, true), 50.0);
         assert_eq!(at(&network, &found, 50.0, 20.0, false), 50.0);
+    }
+
+    #[test]
+    fn a_tunnel_whose_ends_are_not_there_lies_below_the_lowest_ground_over_it() {
+        let road = way(1, "railway=rail tunnel=yes", &[(10.0, 10.0), (90.0, 10.0)]);
+        let (network, found, _) = heights(vec![road], |east, _| 20.0 + 3.0 * (50.0 - east).abs());
+        for east in [10.0, 50.0, 90.0] {
+            let height = at(&network, &found, east, 10.0, false);
+            assert!(height <= 20.0 - 6.0, "{height} m at {east}");
+        }
+    }
+
+    #[test]
+    fn a_bridge_does_not_rise_over_a_tunnel_that_no_ground_covers() {
+        let mut sources = bridge("highway=primary bridge=yes");
+        // Its one end is high above the bridge's banks.
+        sources.push(way(4, "highway=primary tunnel=yes", &[(50.0, 30.0), (50.0, 5.0)]));
+        sources.push(way(5, "highway=primary", &[(50.0, 90.0), (50.0, 30.0)]));
+        let (network, found, _) = heights(sources, |_, north| if north < 28.0 { 10.0 } else { 60.0 });
+        assert!(at(&network, &found, 40.0, 20.0, true) < 20.0, "the bridge stays near its banks");
     }
 
     #[test]

@@ -96,9 +96,15 @@ impl Network {
             }
         }
         let (starts, beside) = neighbours(nodes.len(), &edges);
-        // A deck that ends in the air, where no other way takes it on, rests on the ground there.
+        // A deck that ends in the air, where no other way takes it on, rests on the ground there; a tunnel that does,
+        // as where the area ends, is inside a hill.
+        let is_tunnel = |edge: u32| {
+            let way = &ways[edges[edge as usize].way as usize];
+            matches!(way.traits.storey, Storey::Tunnel(_))
+        };
         for (number, node) in nodes.iter_mut().enumerate() {
-            node.on_ground |= starts[number + 1] - starts[number] == 1;
+            let of_node = &beside[starts[number] as usize..starts[number + 1] as usize];
+            node.on_ground |= matches!(of_node, &[(_, edge)] if !is_tunnel(edge));
         }
         let ways = ways.iter().map(|way| WayOf { traits: way.traits, id: way.id }).collect();
         let mut network = Self { nodes, edges, ways, lattice, starts, beside };
@@ -180,6 +186,11 @@ impl Network {
         for (node, height) in (0..).zip(heights).filter(|(node, _)| !known[parts[*node as usize] as usize]) {
             *height = others(node);
         }
+    }
+
+    /// Whether every edge at a node is in a tunnel.
+    pub(crate) fn is_in_tunnel(&self, node: u32) -> bool {
+        self.beside(node).iter().all(|(_, edge)| matches!(self.traits(*edge).storey, Storey::Tunnel(_)))
     }
 
     /// Decimetres of ways that a node stands for: half of its edges, and one at least.

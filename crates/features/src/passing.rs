@@ -42,10 +42,12 @@ struct Lack {
 /// A corner of an area, in steps east and north.
 type Corner = [f64; 2];
 
-/// Raises decks clear of what they cross as far as the grade allows; what is left is written down.
+/// Raises decks clear of what they cross as far as the grade allows; what is left is written down. A tunnel counts as
+/// no higher than the `ground` over it, whatever its ends ask for.
 pub(crate) fn clear(
     network: &Network,
     swept: &mut Swept,
+    ground: &[Option<i32>],
     water: &[Water],
     clearances: Clearances,
     remarks: &mut Vec<Remark>,
@@ -57,7 +59,8 @@ pub(crate) fn clear(
     let mut overs = overs(network, &decks, water);
     // A round more for decks whose road below was raised with them.
     for _ in 0..CLEAR_ROUNDS {
-        let lacks = lacks(network, &swept.heights, &overs, water, clearances);
+        let lacks =
+            lacks(network, [&swept.heights, &beneath(network, &swept.heights, ground)], &overs, water, clearances);
         if lacks.is_empty() {
             break;
         }
@@ -78,7 +81,8 @@ pub(crate) fn clear(
     // The ground may be cut away, or bored through.
     let belows = Belows { network, water };
     overs.retain(|over| belows.kind(over.below) != Kind::Breakline);
-    for Lack { edge, lack, place, .. } in lacks(network, &swept.heights, &overs, water, clearances) {
+    let heights = [&swept.heights[..], &beneath(network, &swept.heights, ground)];
+    for Lack { edge, lack, place, .. } in lacks(network, heights, &overs, water, clearances) {
         let id = network.ways[network.edges[edge as usize].way as usize].id;
         let flaw = Flaw::ClearanceLacks { quanta: lack };
         Notes { id, lattice: network.lattice, remarks }.write_at(place, flaw, Remedy::LeftAsItIs);
@@ -110,15 +114,32 @@ fn overs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Over> {
     overs
 }
 
-/// Where clearance is missing over anything: of each deck over each feature the worst.
-fn lacks(network: &Network, heights: &[i32], overs: &[Over], water: &[Water], clearances: Clearances) -> Vec<Lack> {
+/// The heights of a network for what lies below decks: inside tunnels no more than the ground.
+fn beneath(network: &Network, heights: &[i32], ground: &[Option<i32>]) -> Vec<i32> {
+    let lower = |(node, (&height, ground)): (u32, (&i32, &Option<i32>))| match ground {
+        Some(ground) if network.is_in_tunnel(node) => height.min(*ground),
+        _ => height,
+    };
+    (0..).zip(heights.iter().zip(ground)).map(lower).collect()
+}
+
+/// Where clearance is missing over anything: of each deck over each feature the worst. Heights are those of decks, and
+/// those of what lies below.
+fn lacks(
+    network: &Network,
+    [heights, beneath]: [&[i32]; 2],
+    overs: &[Over],
+    water: &[Water],
+    clearances: Clearances,
+) -> Vec<Lack> {
     let belows = Belows { network, water };
     let mut worst: BTreeMap<(u32, u64), Lack> = BTreeMap::new();
     for over in overs {
         let clearance = if over.passes { clearances.over(belows.kind(over.below)) } else { 0 };
         let lack = |corner: &Corner| {
             let place = Place::new((corner[1] + 0.5).floor() as i32, (corner[0] + 0.5).floor() as i32);
-            let [deck, below] = [over.edge, over.below].map(|number| belows.height(heights, number, place));
+            let deck = belows.height(heights, over.edge, place);
+            let below = belows.height(beneath, over.below, place);
             Lack { passage: over.passage, edge: over.edge, lack: below + clearance - deck, place }
         };
         let Some(found) =
@@ -335,9 +356,9 @@ mod tests {
         let decks = passages(&network);
         let found = overs(&network, &decks, &[]);
         assert!(found.iter().any(|over| over.passes) && 2 < found.len());
-        assert_eq!(lacks(&network, &heights, &found, &[], Clearances::USUAL), []);
+        assert_eq!(lacks(&network, [&heights; 2], &found, &[], Clearances::USUAL), []);
         let raised = Clearances { rail: Clearances::USUAL.rail + 16, ..Clearances::USUAL };
-        assert_eq!(lacks(&network, &heights, &found, &[], raised).len(), 1, "no higher than it has to be");
+        assert_eq!(lacks(&network, [&heights; 2], &found, &[], raised).len(), 1, "no higher than it has to be");
     }
 
     #[test]

@@ -348,7 +348,9 @@ const TIN: &[Key] = &[
     Key::new("points", "selected points in the whole area")
         .of(&[MethodName::Paper, MethodName::Greedy])
         .whole("a number of selected points", 1..=COUNT_MAX)
-        .otherwise("as many as the limits allow")
+        .otherwise(
+            "as many as the limits allow; method = \"paper\" and edges = \"clip\" need an end, this one or another",
+        )
         .example("points = 76500"),
     Key::new("key", "what makes a post worth a point")
         .words::<ErrorKey>()
@@ -432,7 +434,7 @@ const LOD: &[Key] = &[
 ];
 
 const LEVELS: &[Key] = &[
-    Key::new("inner_share", "how many of the finest level's inner vertices it keeps")
+    Key::new("inner_share", "how many of the finest level's inner vertices it keeps; beside roads and water more stay")
         .form("the share of inner vertices that the level keeps, above 0 and below 1")
         .example("{ inner_share = 0.5 }, half of the vertices inside a load module"),
     Key::new("leave_out", "roads and water that the level does without, and coarser ones with it; decks stay")

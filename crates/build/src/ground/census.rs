@@ -2,7 +2,7 @@
 
 use job::{Job, Voids};
 use source_files::{Patch, SourceError, Standing, VoidSummary};
-use terrain::PostRect;
+use terrain::{Dem, Post, PostRect};
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
@@ -13,7 +13,7 @@ pub struct Census {
     pub filled: usize,
     pub void: usize,
     pub gap: usize,
-    first_void: Option<terrain::Post>,
+    first_void: Option<Post>,
     /// Posts without a source and posts in all, by part of the area, the southern row first.
     parts: Vec<(usize, usize)>,
 }
@@ -29,19 +29,27 @@ impl Census {
 
     /// Of one tile; a post on a side that two tiles share counts in the southern or western one.
     pub fn of(patch: &Patch, area: PostRect) -> Self {
-        let (mut census, rect) = (Self::new(), patch.rect);
+        Self::of_posts(patch.rect, area, |post| patch.standings[patch.rect.index(post)])
+    }
+
+    /// The same of a tile's heights, of which some are void.
+    pub fn of_dem(dem: &Dem, area: PostRect) -> Self {
+        Self::of_posts(dem.rect(), area, |post| if dem.is_void(post) { Standing::Void } else { Standing::Height })
+    }
+
+    fn of_posts(rect: PostRect, area: PostRect, standing: impl Fn(Post) -> Standing) -> Self {
+        let mut census = Self::new();
         for row in rect.south + i32::from(area.south < rect.south)..=rect.north {
             for col in rect.west + i32::from(area.west < rect.west)..=rect.east {
-                let index = rect.index(terrain::Post::new(row, col));
                 let part = (row - area.south) as usize * MAP_ROWS / area.posts_high() * MAP_COLS
                     + (col - area.west) as usize * MAP_COLS / area.posts_wide();
                 census.parts[part].1 += 1;
-                match patch.standings[index] {
+                match standing(Post::new(row, col)) {
                     Standing::Height => {}
                     Standing::Filled => census.filled += 1,
                     Standing::Void => {
                         census.void += 1;
-                        census.first_void = census.first_void.or(Some(terrain::Post::new(row, col)));
+                        census.first_void = census.first_void.or(Some(Post::new(row, col)));
                     }
                     Standing::Gap => {
                         census.gap += 1;

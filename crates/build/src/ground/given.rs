@@ -45,6 +45,11 @@ pub struct Given {
 }
 
 impl Given {
+    /// Posts on a fixed outer border of the area.
+    pub fn outer_posts(&self) -> impl Iterator<Item = Post> {
+        border_posts(&self.posts)
+    }
+
     /// Heights that posts are given, in quanta.
     pub fn heights(&self) -> impl Iterator<Item = i32> {
         self.posts.iter().filter_map(|given| given.height)

@@ -10,7 +10,7 @@ use schedule::Workers;
 use source_files::{VoidSummary, read_polygons};
 use store::Folder;
 use terrain::mask::{Mask, Surroundings};
-use terrain::{Dem, GridFrame, HOLE_CLASS, PostRect, Spacing, TileFeatures, TileId};
+use terrain::{Dem, GridFrame, HOLE_CLASS, Post, PostRect, Spacing, TileFeatures, TileId};
 
 use crate::ground::area::{GamingArea, stretched};
 use crate::ground::burn::burn;
@@ -117,13 +117,14 @@ impl Ground {
         let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
         let lines = OnceLock::new();
         let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
-        if !ground.relief.is_single() {
+        // One raster knows of its own posts alone what is void.
+        if !ground.relief.is_single() || 0 < ground.voids.left {
             ground.take_census(job, area, workers, stop)?;
         }
         Ok(ground)
     }
 
-    /// Looks at every post of a mosaic once, and judges what is missing.
+    /// Looks at every post of the area once, and judges what is missing.
     fn take_census(
         &mut self,
         job: &Job,
@@ -132,7 +133,10 @@ impl Ground {
         stop: &AtomicBool,
     ) -> Result<(), GroundError> {
         let of_tile = |_: usize, &tile: &TileId| -> Result<Census, GroundError> {
-            let Some(patch) = self.relief.patch(area.tiling.rect(tile))? else { return Ok(Census::new()) };
+            let rect = area.tiling.rect(tile);
+            let Some(patch) = self.relief.patch(rect)? else {
+                return Ok(Census::of_dem(&self.relief.dem(rect)?, area.rect));
+            };
             let census = Census::of(&patch, area.rect);
             if let Some(kept) = &self.kept {
                 let window = Arc::new(self.with_given(area, tile, self.with_importance(patch.dem())?)?);
@@ -175,6 +179,11 @@ impl Ground {
     pub fn bounds(&self) -> Option<Bounds> {
         let told = self.relief.water.iter().flat_map(Water::levels_known).chain(self.given.heights());
         self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
+    }
+
+    /// Points that the job gives on a fixed outer border of the area.
+    pub fn given_outer_posts(&self) -> impl Iterator<Item = Post> {
+        self.given.outer_posts()
     }
 
     /// From now on, features are burned into every window but natural ones, as `folder` has them. Posts on those that

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 
 use job::{Job, Resampling, SourceFile, Voids};
 use schedule::Workers;
-use source_files::{DemFile, Look, SourceError, WideMosaic, Windows, window_under};
+use source_files::{DemFile, Look, SourceError, WideMosaic, Windows, edge_steps_by_window, window_under};
 use terrain::{PostRect, TileId};
 
 use crate::ground::GroundError;
@@ -13,6 +13,7 @@ use crate::ground::datums::{datum_of, judge_datums};
 use crate::ground::source::{
     Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, union, warnings_of,
 };
+use crate::ground::sources::told;
 
 /// Bytes that rasters may take under an area and still be decoded whole.
 pub const WHOLE_BYTES_MAX: u64 = 96 << 20;
@@ -89,6 +90,10 @@ pub fn open(
         true => Source::Window(Box::new(windows)),
         false => {
             let place = (&crs, &area.frame, area.rect);
+            let steps =
+                edge_steps_by_window(&windows, used.iter().map(|&(file, _)| file), place, 0.0 < job.dem.feather_m);
+            let frame = |place: usize| windows.files()[used[place].0].frame();
+            warnings.extend(steps.iter().filter_map(|step| told(step, frame)));
             Source::Wide(Box::new(WideMosaic::new(windows, &used, mosaic_rules(job), place)?))
         }
     };

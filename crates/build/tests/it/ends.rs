@@ -1,6 +1,7 @@
 //! Ends that a job asks for: a largest residual, an RMS residual.
 
 use build::Built;
+use terrain::Dem;
 
 use crate::scene::{Scene, Words};
 
@@ -49,6 +50,38 @@ fn a_largest_residual_holds_where_ground_weighs_little() {
         let scene = Scene::new(&words);
         let largest = scene.build("area", 2).report.residual.max_m;
         assert!(largest <= 20.0, "{method}{largest} m is left");
+    }
+}
+
+#[test]
+fn a_tile_that_needs_most_of_the_budget_for_a_largest_residual_gets_it() {
+    let limits = "per_load_module = 400\nmean_per_load_module = 30\nper_4km_square = 50000";
+    for method in ["", "effort = \"fast\"\n", "method = \"greedy\"\n"] {
+        let words = Words {
+            size: (6, 6),
+            tiles: (3, 3),
+            limits: limits.into(),
+            tin: format!("{method}max_residual_m = 10"),
+            ..Words::raster()
+        };
+        // Noise that no tile has to follow, and bumps that one has to.
+        let dem = Dem::from_fn(words.grid().area(), |post| {
+            let noise = (post.row * 7919 + post.col * 104_729).rem_euclid(1201) - 600;
+            let is_rough = post.row < 40 && post.col < 40;
+            let bumps = if is_rough {
+                60.0 * (f64::from(post.row) * 0.5).sin() * (f64::from(post.col) * 0.5).cos()
+            } else {
+                0.0
+            };
+            Some((bumps * 128.0) as i32 + noise)
+        });
+        let report = Scene::on(&words, &dem).build("area", 2).report;
+        assert!(
+            report.residual.max_m <= 10.0,
+            "{method}{} m is left with {} triangles",
+            report.residual.max_m,
+            report.triangles
+        );
     }
 }
 

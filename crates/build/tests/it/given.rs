@@ -283,3 +283,23 @@ fn a_file_of_points_starts_tiles_and_fixes_the_border() {
     assert!(all.contains(&(Post::new(0, 47), 777 * 128)));
     assert!(all.iter().any(|(post, _)| *post == Post::new(31, 33)));
 }
+
+#[test]
+fn points_on_a_fixed_outer_border_count_in_the_limits() {
+    for tin in ["start = \"points.csv\"", "effort = \"fast\"\nstart = \"points.csv\""] {
+        let fixed = Words { modules: "outer_border = \"fixed\"".into(), ..words(tin) };
+        let scene = Scene::with_files(&fixed, |folder| {
+            let places = (1..20).map(|step| [0, step * 7]).chain((1..20).map(|step| [step * 9, 200]));
+            let lines = places.map(|[row, col]| {
+                format!("{},{},\n", ORIGIN_M[0] + f64::from(col) * 25.0, ORIGIN_M[1] + f64::from(row) * 25.0)
+            });
+            std::fs::write(folder.join("points.csv"), format!("east,north,height_m\n{}", lines.collect::<String>()))
+                .unwrap();
+        });
+        let report = scene.build("a.tdb", 2).report;
+        assert!(report.breaches.is_empty(), "{tin}: {:?}", report.breaches);
+        scene.verify("a.tdb");
+        let count = vertices(&scene, "a.tdb").iter().filter(|(post, _)| post.row == 0 && post.col % 7 == 0).count();
+        assert!(19 <= count, "{count} of 19 points on the border are there");
+    }
+}

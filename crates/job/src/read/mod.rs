@@ -191,10 +191,15 @@ fn read_tiles(tiles: &Section, grid: &ModuleGrid) -> Result<TilesSpec, JobError>
 /// would be too narrow.
 fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
     let most = (modules / MODULES_PER_TILE_MIN).max(1);
+    let what = format!("tiles of {modules} load modules, at least two each");
     match tiles.optional(key) {
-        Some(entry) => entry
-            .whole_in(&(1..=most.into()), &format!("tiles of {modules} load modules, at least two each"))
-            .map(in_32_bits),
+        Some(entry) => entry.whole_in(&(1..=most.into()), &what).map(in_32_bits).map_err(|error| match error {
+            // The usual number may be more than there can be here.
+            JobError::OutOfRange(fault) => {
+                JobError::OutOfRange(Box::new(Fault { hint: format!("at most {key} = {most}"), ..*fault }))
+            }
+            error => error,
+        }),
         None => tiles.whole_u32(key).map(|usual| usual.min(most)),
     }
 }

@@ -289,6 +289,7 @@ fn summary_json(mesh: &Mesh, measured: Option<&Fidelity>) -> Value {
         "triangles": mesh.tin.triangles.len(),
         "residual": mesh.residual,
         "tiles": [mesh.tiles.0, mesh.tiles.1],
+        "voids": mesh.dem.void_count(),
     });
     if let Some(limit) = mesh.limit {
         summary["limit"] = json!({
@@ -433,5 +434,16 @@ fn summary(mesh: &Mesh, seconds: f64) -> String {
     let eta = limit.map_or_else(String::new, |(limit, eta)| {
         format!("eta: {}\n", eta_in_words(eta, limit.triangles as u64, limit.rough_share))
     });
-    format!("{points} points, {triangles} triangles in {seconds:.1} s: {end}\nresidual: {residual}\n{eta}")
+    let voids = voids_in_words(mesh.dem.void_count(), mesh.dem.rect().post_count());
+    format!("{points} points, {triangles} triangles in {seconds:.1} s: {end}\nresidual: {residual}\n{eta}{voids}")
+}
+
+/// What a person should know of posts without a height; nothing where there are none.
+fn voids_in_words(voids: usize, posts: usize) -> String {
+    if voids == 0 {
+        return String::new();
+    }
+    let share = 100.0 * voids as f64 / posts as f64;
+    let (voids, posts) = (grouped(voids as u64), grouped(posts as u64));
+    format!("voids: {voids} of {posts} posts ({share:.1} %), over which the mesh has holes\n")
 }

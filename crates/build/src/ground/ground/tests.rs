@@ -135,24 +135,24 @@ fn water_far_off_its_level_is_told() {
 
 #[test]
 fn a_step_where_a_raster_ends_over_another_is_told() {
-    let folder = TempDir::new().unwrap();
-    write_flat(folder.path(), "west.tif", 100, (504_500.0, 81));
-    let told = |height_m: i32, feather: &str| {
-        write_flat(folder.path(), "east.tif", height_m, (506_000.0, 101));
-        let dem = format!("sources = [\"west.tif\", \"east.tif\"]\n{feather}");
-        open(&job(folder.path(), &dem, ""), u64::MAX).unwrap().1.warnings
-    };
-    let found = told(120, "");
-    let [step] = &found[..] else { panic!("one is told: {found:?}") };
-    assert!(step.contains("west.tif ends in a step of 20.0 m,"), "{step}");
-    assert_eq!([told(104, ""), told(120, "feather_m = 300")], [Vec::<String>::new(), Vec::new()]);
-    // One that begins a post later has nothing to fade into.
-    let abutting = |height_m: i32| {
-        write_flat(folder.path(), "east.tif", height_m, (506_525.0, 80));
-        let dem = "sources = [\"west.tif\", \"east.tif\"]\nfeather_m = 300";
-        open(&job(folder.path(), dem, ""), u64::MAX).unwrap().1.warnings.len()
-    };
-    assert_eq!([abutting(102), abutting(120)], [0, 1]);
+    for bytes in [u64::MAX, 0] {
+        let folder = TempDir::new().unwrap();
+        write_flat(folder.path(), "west.tif", 100, (504_500.0, 81));
+        let told = |(height_m, west_m, cols): (i32, f64, usize), feather: &str| {
+            write_flat(folder.path(), "east.tif", height_m, (west_m, cols));
+            let dem = format!("sources = [\"west.tif\", \"east.tif\"]\n{feather}");
+            open(&job(folder.path(), &dem, ""), bytes).unwrap().1.warnings
+        };
+        let over = |height_m: i32| (height_m, 506_000.0, 101);
+        let found = told(over(120), "");
+        let [step] = &found[..] else { panic!("one is told: {found:?}, {bytes} bytes") };
+        assert!(step.contains("west.tif ends in a step of 20.0 m,"), "{step}");
+        let silent = [told(over(104), ""), told(over(120), "feather_m = 300")];
+        assert_eq!(silent, [Vec::<String>::new(), Vec::new()], "{bytes} bytes");
+        // One that begins a post later has nothing to fade into.
+        let abutting = |height_m: i32| told((height_m, 506_525.0, 80), "feather_m = 300").len();
+        assert_eq!([abutting(102), abutting(120)], [0, 1], "{bytes} bytes");
+    }
 }
 
 #[test]

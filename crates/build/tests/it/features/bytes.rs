@@ -78,6 +78,26 @@ fn a_tile_built_again_is_as_it_was() {
 }
 
 #[test]
+fn a_tile_built_again_after_roads_were_drawn_in_it_leaves_an_area_that_is_sound() {
+    for tin in ["", "method = \"greedy\""] {
+        let words = crate::scene::Words { tin: tin.into(), ..Drawing::words() };
+        let drawing = Drawing::of(words, hills, &drawn());
+        drawing.built();
+        let mut more = drawn();
+        more.insert(0, line("highway=residential", &[(1450.0, 1900.0), (1500.0, 1600.0), (1850.0, 1500.0)]));
+        more.push(line("highway=track", &[(1100.0, 1200.0), (1300.0, 1300.0), (1250.0, 1450.0)]));
+        fs::write(drawing.scene.path("features.geojson"), geojson(&more)).unwrap();
+        let again = drawing.scene.try_tile("area.tdb", terrain::TileId { row: 1, col: 1 }, false).unwrap();
+        assert!(again.report.breaches.is_empty(), "{tin}: {:?}", again.report.breaches);
+        drop(again);
+        drawing.scene.verify("area.tdb");
+        drawing.scene.build("area.tdb", 2);
+        drawing.scene.build("fresh.tdb", 2);
+        assert_same(&drawing.scene.product("fresh.tdb"), &drawing.scene.product("area.tdb"), "after a build");
+    }
+}
+
+#[test]
 fn a_file_without_features_makes_the_load_modules_of_a_job_without_them() {
     let (with, without) = (Drawing::new(hills, &[]), Drawing::new(hills, &[]));
     with.built();
