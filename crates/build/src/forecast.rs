@@ -111,6 +111,10 @@ const BYTES_PER_SOURCE_POST: u64 = 4;
 /// Bytes of memory for a byte of a file of features, OpenStreetMap's or GeoJSON, and the bytes that a square kilometre
 /// of area may have of them: larger files reach beyond it. Measured on six areas of towns and of deserts.
 const MEMORY_FEATURES: (u64, f64) = (60, 10e3);
+/// Bytes more for such a byte where the page draws objects.
+const MEMORY_OBJECTS: u64 = 60;
+/// Seconds for such a byte: to read it, and to decide heights and shapes of what it says.
+const FEATURES_S: f64 = 2.5e-6;
 
 /// What a build goes by.
 struct Size {
@@ -186,7 +190,7 @@ fn stage_seconds(job: &Job, size: &Size) -> StageSeconds {
     let levels = job.lod.inner_shares.len() as f64 * LEVEL_S;
     let (surveyed, refined) = if size.is_surveyed { (first, others) } else { (0.0, first) };
     StageSeconds {
-        survey: surveyed + triangles * survey,
+        survey: surveyed + triangles * survey + bytes_of_features(job, size) as f64 * FEATURES_S,
         refine: refined + triangles * (GROW_S + optimise),
         assemble: others + triangles * (assemble + levels),
         publish: others,
@@ -235,14 +239,16 @@ fn shared_bytes(job: &Job, size: &Size) -> u64 {
         DemSource::Files { .. } => (size.posts * BYTES_PER_SOURCE_POST).min(CACHE_BYTES_MAX + CACHE_BYTES_MAX / 4),
     };
     // Windows that were kept are gone when the page is drawn.
-    MEMORY_BASE + tins + counts + (kept + source).max(page) + feature_bytes(job, size)
+    let objects = if job.objects.is_some() && size.has_maps_on_page() { MEMORY_OBJECTS } else { 0 };
+    let features = (MEMORY_FEATURES.0 + objects) * bytes_of_features(job, size);
+    MEMORY_BASE + tins + counts + (kept + source).max(page) + features
 }
 
-/// Memory for roads, rivers, lakes and what stands beside them.
-fn feature_bytes(job: &Job, size: &Size) -> u64 {
+/// Bytes of the files of roads, rivers, lakes and what stands beside them, as far as they are of the area, about.
+fn bytes_of_features(job: &Job, size: &Size) -> u64 {
     let on_disk = job.features.as_ref().map_or(0, |features| features.bytes_on_disk());
     let km2 = size.posts as f64 * (job.area.spacing.metres() / 1000.0).powi(2);
-    MEMORY_FEATURES.0 * on_disk.min((MEMORY_FEATURES.1 * km2) as u64)
+    on_disk.min((MEMORY_FEATURES.1 * km2) as u64)
 }
 
 fn worker_bytes(job: &Job, size: &Size) -> u64 {

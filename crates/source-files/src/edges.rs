@@ -86,7 +86,7 @@ impl Stack for ByWindow<'_> {
         let posts = Corner::around(units_of(frame, place), frame, part)?.posts();
         let [south, north] = [posts.south, posts.north].map(|row| row + part.south);
         let [west, east] = [posts.west, posts.east].map(|col| col + part.west);
-        // What cannot be read is told of by whoever needs it.
+        // What cannot be read is told where it is needed.
         height_m(&self.windows.read(file, PostRect { south, west, north, east }).ok()?, place)
     }
 
@@ -188,8 +188,8 @@ fn box_of((frame, part): (&RasterFrame, PostRect), area: &Crs) -> Option<[[f64; 
     Some(all)
 }
 
-/// The outermost posts of a raster that are in a part of it, `posts_max` of each edge at most, each with the step of row
-/// and column to the post further in.
+/// The outermost posts of a raster that are in a part of it, `posts_max` of each edge at most, each with the step of
+/// row and column to the post further in.
 fn edge(frame: &RasterFrame, part: PostRect, posts_max: i32) -> impl Iterator<Item = (Post, [i32; 2])> {
     let all = frame.rect();
     let along = move |low: i32, high: i32| (low..=high).step_by(((high - low) / posts_max).max(1) as usize);

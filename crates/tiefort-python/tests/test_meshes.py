@@ -23,6 +23,9 @@ def test_a_mesh_has_what_was_asked_for_and_stands_where_the_array_does() -> None
     assert mesh.vertices[:, :2].min(axis=0).tolist() == [0, 0]
     assert mesh.vertices[:, :2].max(axis=0).tolist() == [159 * 25, 119 * 25]
     assert mesh.crs is None and mesh.transform == (25.0, 0.0, -12.5, 0.0, -25.0, 119 * 25 + 12.5)
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.vertices[0, 2] += 10
+    assert not mesh.triangles.flags.writeable and mesh.vertices.copy().flags.writeable
     a, b, c = (mesh.vertices[mesh.triangles[:, corner]] for corner in range(3))
     cross = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     assert (0 < cross).all() and cross.sum() / 2 == pytest.approx(159 * 119 * 625)

@@ -136,14 +136,17 @@ fn criteria(found: &Correlation) -> CertificateSection {
         sentences.push("Causes, the likeliest first:".to_owned());
         sentences.extend(found.causes.iter().map(|cause| format!("- {cause}")));
     }
-    let (only, both, pairs) = (found.only_one, found.void_places, found.void_pairs);
-    if 0 < only[0] + only[1] + both + pairs {
+    let (places, pairs) = (found.only_one, found.only_one_pairs);
+    if 0 < places[0] + places[1] + pairs[0] + pairs[1] + found.void_places + found.void_pairs {
         sentences.push(format!(
-            "Ground in A alone: {} places; in B alone: {}. Drawn again: {} places without ground, {} pairs.",
-            grouped(only[0]),
-            grouped(only[1]),
-            grouped(both),
-            grouped(pairs)
+            "Ground in A alone: {} places, {} pairs; in B alone: {} places, {} pairs. Drawn again: {} places without \
+             ground, {} pairs.",
+            grouped(places[0]),
+            grouped(pairs[0]),
+            grouped(places[1]),
+            grouped(pairs[1]),
+            grouped(found.void_places),
+            grouped(found.void_pairs)
         ));
     }
     let mut explained = vec!["A place, or a pair of places, agrees where:".to_owned()];
@@ -256,7 +259,8 @@ fn slopes(found: &Correlation) -> CertificateSection {
     CertificateSection {
         title: "Slopes".into(),
         sentences: vec![format!(
-            "Places by class of slope, taken over {} m: {} in the same class, {}; RMS difference {:.2} degrees.",
+            "Places with a slope on both by its class, taken over {} m: {} in the same class, {}; RMS difference \
+             {:.2} degrees.",
             figures.apart_m,
             found_percent(agree),
             kappa_text(&figures.classes),
@@ -283,6 +287,9 @@ fn sights(found: &Correlation) -> CertificateSection {
         vec![format!("{} m", sight.above_m), both, neither, a_only, b_only, found_percent(agree), kappa]
     });
     let mut sentences = vec!["Pairs of places that see each other, both as high above the ground.".to_owned()];
+    if found.only_one_pairs != [0; 2] {
+        sentences.push("Those over a hole of one surface agree in nothing, and are not among these.".into());
+    }
     if found.sights.iter().any(|sight| sight.pairs.kappa().is_none()) {
         sentences.push("Kappa is undefined where every pair is seen on both, or hidden on both.".into());
     }

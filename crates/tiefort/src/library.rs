@@ -166,10 +166,15 @@ fn flags(words: &str) -> impl Iterator<Item = &str> {
 
 /// What a value should have been: a range in words, where it is one.
 fn expected(why: &str) -> String {
-    let range = why.split_once(" is not in ").and_then(|(_, range)| range.split_once("..="));
-    match range {
-        Some((least, most)) if most.len() < u32::MAX.to_string().len() => format!("expected {least} to {most}"),
+    let (found, range) = why.split_once(" is not in ").unwrap_or_default();
+    // The largest number of a type is told to one who passed it.
+    let is_beyond = |most: &str| found.parse::<f64>().is_ok_and(|found| most.parse().is_ok_and(|most| found > most));
+    match range.split_once("..=") {
+        Some((least, most)) if most.len() < u32::MAX.to_string().len() || is_beyond(most) => {
+            format!("expected {least} to {most}")
+        }
         Some((least, _)) => format!("expected {least} or more"),
+        None if why.starts_with("number too large") => "expected a smaller number".into(),
         None => why.to_owned(),
     }
 }
@@ -185,6 +190,10 @@ mod tests {
         assert_eq!(request(&["--points", "50"]).unwrap().points, Some(50));
         let of_triangles = refused(&["--triangles", "1"]);
         assert_eq!(of_triangles, "--triangles: found \"1\", expected 2 or more");
+        let beyond = refused(&["--triangles", "1000000000000"]);
+        assert_eq!(beyond, "--triangles: found \"1000000000000\", expected 2 to 4294967295");
+        let beyond = refused(&["--triangles", "100000000000000000000"]);
+        assert!(beyond.ends_with(", expected a smaller number"), "{beyond}");
         let without_end = "found nothing, expected a value for one of --points, --triangles, --max-residual, --rms";
         assert_eq!(refused(&[]), without_end);
         let of_effort = refused(&["--points", "50", "--effort", "bset"]);

@@ -11,9 +11,8 @@ use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
 use crate::ground::datums::{datum_of, judge_datums};
 use crate::ground::source::{
-    Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, union, warnings_of,
+    Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, told, union, warnings_of,
 };
-use crate::ground::sources::told;
 
 /// Bytes that rasters may take under an area and still be decoded whole.
 pub const WHOLE_BYTES_MAX: u64 = 96 << 20;

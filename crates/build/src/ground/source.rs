@@ -5,7 +5,8 @@ use std::sync::atomic::AtomicBool;
 use job::{Job, SourceFile, SourceSaid, Voids};
 use schedule::Workers;
 use source_files::{
-    Crs, DatumShift, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, WideMosaic, Windows,
+    Crs, DatumShift, DemFile, EdgeStep, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, WideMosaic,
+    Windows,
 };
 use terrain::{PostRect, TileId};
 
@@ -141,4 +142,19 @@ pub fn warnings_of(frame: &RasterFrame, range_m: Option<(f64, f64)>, notes: &[St
         warnings.push(format!("{path}: {} more of the same kind", notes.len() - NOTES_MAX));
     }
     warnings
+}
+
+/// What a person should know of a step between two rasters: what differs by less is noise of two measurements.
+pub fn told<'a>(
+    &EdgeStep { upper, lower, height_m }: &EdgeStep,
+    frame: impl Fn(usize) -> &'a RasterFrame,
+) -> Option<String> {
+    const HEIGHT_MAX_M: f64 = 5.0;
+    let [upper, lower] = [upper, lower].map(|place| frame(place).path.display());
+    (HEIGHT_MAX_M < height_m).then(|| {
+        format!(
+            "{upper} ends in a step of {height_m:.1} m, beyond which {lower} goes on; dem.feather_m spreads it where \
+             they overlap, and vertical_datum of each says what they are above"
+        )
+    })
 }

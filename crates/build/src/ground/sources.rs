@@ -4,14 +4,12 @@ use std::sync::atomic::AtomicBool;
 
 use job::{Job, Resampling, SourceFile, Voids};
 use schedule::Workers;
-use source_files::{
-    DemFile, EdgeStep, Mosaic, Raster, RasterFrame, SourceError, VoidPolicy, VoidSummary, edge_steps, window_under,
-};
+use source_files::{DemFile, Mosaic, Raster, SourceError, VoidPolicy, VoidSummary, edge_steps, window_under};
 
 use crate::ground::area::GamingArea;
 use crate::ground::datums::{Datums, datum_of, judge_datums};
 use crate::ground::source::{
-    Decoded, Source, area_crs, decode, mosaic_rules, nothing_reaches, raised, reading, union, warnings_of,
+    Decoded, Source, area_crs, decode, mosaic_rules, nothing_reaches, raised, reading, told, union, warnings_of,
 };
 use crate::ground::{GroundError, large};
 
@@ -140,21 +138,6 @@ fn open_mosaic(
     warnings.extend(steps.iter().filter_map(|step| told(step, |place| rasters[place].frame())));
     let source = Mosaic::new(rasters, mosaic_rules(job), &crs, &area.frame, area.rect)?;
     Ok(Decoded { source, warnings, accuracy_m, range_m })
-}
-
-/// What a person should know of a step between two rasters: what differs by less is noise of two measurements.
-pub(super) fn told<'a>(
-    &EdgeStep { upper, lower, height_m }: &EdgeStep,
-    frame: impl Fn(usize) -> &'a RasterFrame,
-) -> Option<String> {
-    const HEIGHT_MAX_M: f64 = 5.0;
-    let [upper, lower] = [upper, lower].map(|place| frame(place).path.display());
-    (HEIGHT_MAX_M < height_m).then(|| {
-        format!(
-            "{upper} ends in a step of {height_m:.1} m, beyond which {lower} goes on; dem.feather_m spreads it where \
-             they overlap, and vertical_datum of each says what they are above"
-        )
-    })
 }
 
 fn raster_warnings(raster: &Raster) -> Vec<String> {

@@ -1,5 +1,6 @@
 //! What is accepted, and the likeliest cause where something is not.
 
+use super::feet::Feet;
 use super::found::{Correlation, Criterion, SightFigures};
 use super::shift::Shift;
 
@@ -7,7 +8,7 @@ use super::shift::Shift;
 pub(super) fn criteria(found: &Correlation) -> Vec<Criterion> {
     let request = &found.request;
     let heights = found.heights.places + found.only_one[0] + found.only_one[1];
-    let slopes = found.slopes.classes.total();
+    let (slopes, only_one_pairs) = (found.slopes.judged(), found.only_one_pairs.iter().sum::<u64>());
     let criterion =
         |name: &str, agrees_where: String, judged| Criterion::new(name.into(), agrees_where, judged, &request.demand);
     let mut criteria = vec![
@@ -22,17 +23,20 @@ pub(super) fn criteria(found: &Correlation) -> Vec<Criterion> {
         criterion(
             "slopes",
             format!(
-                "slopes over {} m differ by {} degrees at most",
+                "slopes over {} m differ by {} degrees at most; a place where only one has a slope does not agree",
                 found.slopes.apart_m, request.slope_within_degrees
             ),
             (slopes, slopes - found.slopes.within),
         ),
     ];
     criteria.extend(found.sights.iter().map(|sight| {
-        let pairs = (sight.pairs.total(), sight.pairs.total() - sight.pairs.agreeing());
-        let agrees_where =
-            format!("both show, or both hide, the far end, {} m above the ground as the eye", sight.above_m);
-        criterion(&format!("sight {} m", sight.above_m), agrees_where, pairs)
+        let judged = sight.pairs.total() + only_one_pairs;
+        let agrees_where = format!(
+            "both show, or both hide, the far end, {} m above the ground as the eye; a pair over a hole of one does \
+             not agree",
+            sight.above_m
+        );
+        criterion(&format!("sight {} m", sight.above_m), agrees_where, (judged, judged - sight.pairs.agreeing()))
     }));
     criteria
 }
@@ -47,9 +51,9 @@ pub(super) fn causes(found: &Correlation) -> Vec<String> {
             causes.push(format!("{name} has no ground at {share} of the places"));
         }
     }
-    let shift = found.shift.as_ref().and_then(|shift| shift_in_words(found, shift));
-    // A shift that stands alone explains what follows; beside holes it comes after them.
-    causes.extend(shift);
+    let shift = || found.shift.as_ref().and_then(|shift| shift_in_words(found, shift));
+    // A shift that stands alone explains what follows; beside holes it comes after them. Other units look like one.
+    causes.extend(found.feet.as_ref().map(Feet::in_words).or_else(shift));
     for criterion in found.criteria.iter().filter(|criterion| !criterion.is_accepted()) {
         causes.push(match criterion.failures_max {
             None => format!("{}: {} judged, too few to tell", criterion.name, criterion.samples),
@@ -72,12 +76,18 @@ fn disagreement(found: &Correlation, criterion: &Criterion) -> String {
             format!("heights differ by more than {within_m} m, or one is missing, at {share} of the places")
         }
         (_, Some(sight)) => {
-            format!("lines of sight at {} m differ for {share} of the pairs: {}", sight.above_m, who_sees_more(sight))
+            let or_over_holes = if found.only_one_pairs == [0; 2] { "" } else { ", or go over a hole of one surface," };
+            format!(
+                "lines of sight at {} m differ{or_over_holes} for {share} of the pairs{}",
+                sight.above_m,
+                who_sees_more(sight)
+            )
         }
         _ => {
             let gentler = gentler_on_b(found);
+            let or_missing = if found.slopes.only_one == [0; 2] { "" } else { ", or one is missing," };
             format!(
-                "slopes differ by more than {} degrees at {share} of the places{gentler}",
+                "slopes differ by more than {} degrees{or_missing} at {share} of the places{gentler}",
                 found.request.slope_within_degrees
             )
         }
@@ -89,11 +99,14 @@ fn who_sees_more(sight: &SightFigures) -> String {
     let [[_, b_only], [a_only, _]] = sight.pairs.0;
     let (more, fewer) = (b_only.max(a_only), b_only.min(a_only));
     let apart = (more - fewer) as f64;
+    if more == 0 {
+        return String::new();
+    }
     if apart * apart <= 9.0 * (more + fewer) as f64 {
-        return "each shows what the other hides".into();
+        return ": each shows what the other hides".into();
     }
     let (seeing, hiding) = if a_only < b_only { ("B", "A") } else { ("A", "B") };
-    format!("{seeing} shows more, as smoother ground does; {hiding} hides more")
+    format!(": {seeing} shows more, as smoother ground does; {hiding} hides more")
 }
 
 fn gentler_on_b(found: &Correlation) -> &'static str {
@@ -141,8 +154,8 @@ fn shift_in_words(found: &Correlation, shift: &Shift) -> Option<String> {
 /// A known mistake that has this shift.
 fn looks_like(found: &Correlation, shift: &Shift, is_aside: bool, is_up: bool) -> &'static str {
     const LIKE_HALF: std::ops::Range<f64> = 0.4..0.6;
-    /// Metres from which a difference of datums is likely.
-    const DATUM_M: f64 = 3.0;
+    /// Metres by which datums differ: geoids lie up to 107 m from the ellipsoid.
+    const DATUM_M: std::ops::Range<f64> = 3.0..120.0;
     let is_half_of = |spacing: [f64; 2]| {
         let posts = [0, 1].map(|axis| shift.by_m[axis].abs() / spacing[axis]);
         let is_half = posts.map(|posts| LIKE_HALF.contains(&posts));
@@ -150,7 +163,8 @@ fn looks_like(found: &Correlation, shift: &Shift, is_aside: bool, is_up: bool) -
     };
     if is_aside && found.surfaces.iter().any(|surface| is_half_of(surface.spacing_m)) {
         ", half a post, as where posts are taken for areas"
-    } else if !is_aside && is_up && DATUM_M < shift.by_m[2].abs() && 3.0 * shift.rms_m[1] < shift.by_m[2].abs() {
+    } else if !is_aside && is_up && DATUM_M.contains(&shift.by_m[2].abs()) && 3.0 * shift.rms_m[1] < shift.by_m[2].abs()
+    {
         ", as above another vertical datum"
     } else {
         ""

@@ -3,6 +3,7 @@
 use load_module_reader::Standing;
 use serde::Serialize;
 
+use super::feet::Feet;
 use super::heights::{DifferenceMap, HeightFigures, SlopeFigures};
 use super::shift::Shift;
 use super::statistics::{Confusion, Demand, Plan, clopper_pearson};
@@ -34,7 +35,7 @@ pub struct CorrelateRequest {
 pub struct SightFigures {
     /// Metres above the ground, of both ends.
     pub above_m: f64,
-    /// Pairs of places: rows hidden and seen on A, columns hidden and seen on B.
+    /// Pairs of places over ground that both have: rows hidden and seen on A, columns hidden and seen on B.
     pub pairs: Confusion<2>,
 }
 
@@ -76,12 +77,16 @@ pub struct Correlation {
     pub standing: Standing,
     /// Lines of sight, lowest first.
     pub sights: Vec<SightFigures>,
-    /// Pairs over ground that one of them does not have, or that fitted nowhere: drawn again.
+    /// Pairs over ground that only A has all along, and that only B has: they agree in nothing.
+    pub only_one_pairs: [u64; 2],
+    /// Pairs over holes of both, or that fitted nowhere: drawn again.
     pub void_pairs: u64,
     /// What is accepted and what is not.
     pub criteria: Vec<Criterion>,
     /// Why, in sentences without their full stops, the likeliest cause first.
     pub causes: Vec<String>,
+    /// The unit that one's heights look like, where the other's are metres.
+    pub feet: Option<Feet>,
     /// Where heights differ.
     pub map: DifferenceMap,
 }

@@ -16,8 +16,36 @@ pub(super) struct Place {
     pub heights_m: [Option<f64>; 2],
     /// Class of A's ground.
     pub class: Option<u8>,
-    /// Gradients of both, where both have one.
-    pub gradients: Option<[[f64; 2]; 2]>,
+    /// Slopes.
+    pub slopes: Slopes,
+}
+
+/// Slopes of both grounds at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Slopes {
+    /// Gradients of both.
+    Both([[f64; 2]; 2]),
+    /// Only this one, 0 for A and 1 for B, has ground there, or a slope.
+    One(usize),
+    /// Neither has one, or the place lies beside the border, where slopes are not told.
+    Untold,
+}
+
+impl Slopes {
+    /// From the heights and gradients that each has at a place inside the border.
+    pub fn of(heights_m: [Option<f64>; 2], gradients: [Option<[f64; 2]>; 2]) -> Self {
+        match gradients {
+            [Some(a), Some(b)] => Self::Both([a, b]),
+            [Some(_), None] => Self::One(0),
+            [None, Some(_)] => Self::One(1),
+            // Beside a hole of one, over a hole of the other.
+            [None, None] => match heights_m.map(|height_m| height_m.is_some()) {
+                [true, false] => Self::One(0),
+                [false, true] => Self::One(1),
+                _ => Self::Untold,
+            },
+        }
+    }
 }
 
 impl Place {
@@ -77,19 +105,29 @@ impl HeightFigures {
 pub struct SlopeFigures {
     /// Metres over which slopes are taken.
     pub apart_m: f64,
-    /// Places by class of slope: rows are those of A, columns those of B.
+    /// Places by class of slope on both: rows are those of A, columns those of B.
     pub classes: Confusion<SLOPE_CLASSES>,
     /// Places where slopes differ by no more than is allowed.
     pub within: u64,
+    /// Places where only A has a slope, and where only B has: they agree in nothing.
+    pub only_one: [u64; 2],
     /// Root mean square of the differences, in degrees; 0 without places.
     pub rms_degrees: f64,
 }
 
 impl SlopeFigures {
-    pub(super) fn of(gradients: impl Iterator<Item = [[f64; 2]; 2]>, apart_m: f64, within_degrees: f64) -> Self {
-        let mut figures =
-            Self { apart_m, classes: Confusion([[0; SLOPE_CLASSES]; SLOPE_CLASSES]), within: 0, rms_degrees: 0.0 };
-        for both in gradients {
+    pub(super) fn of(slopes: impl Iterator<Item = Slopes>, apart_m: f64, within_degrees: f64) -> Self {
+        let classes = Confusion([[0; SLOPE_CLASSES]; SLOPE_CLASSES]);
+        let mut figures = Self { apart_m, classes, within: 0, only_one: [0; 2], rms_degrees: 0.0 };
+        for slopes in slopes {
+            let both = match slopes {
+                Slopes::Both(both) => both,
+                Slopes::One(which) => {
+                    figures.only_one[which] += 1;
+                    continue;
+                }
+                Slopes::Untold => continue,
+            };
             // The same on every machine, because it decides.
             let [a, b] = both.map(|[x, y]| libm::atan((x * x + y * y).sqrt()).to_degrees());
             let class = |degrees: f64| SLOPE_ENDS_DEGREES.iter().filter(|&&end| end <= degrees).count();
@@ -99,6 +137,11 @@ impl SlopeFigures {
         }
         figures.rms_degrees = (figures.rms_degrees / figures.classes.total().max(1) as f64).sqrt();
         figures
+    }
+
+    /// Places where slopes agree or do not, those among them that only one has included.
+    pub fn judged(&self) -> u64 {
+        self.classes.total() + self.only_one[0] + self.only_one[1]
     }
 }
 
@@ -149,9 +192,22 @@ mod tests {
     #[test]
     fn a_slope_at_the_end_of_a_class_is_of_the_next() {
         let slope = |degrees: f64| [degrees.to_radians().tan(), 0.0];
-        let found = SlopeFigures::of([[slope(1.0), slope(45.0)], [slope(4.0), slope(3.0)]].into_iter(), 25.0, 5.0);
+        let both = [[slope(1.0), slope(45.0)], [slope(4.0), slope(3.0)]].map(Slopes::Both);
+        let more = [Slopes::One(0), Slopes::Untold, Slopes::One(0), Slopes::One(1)];
+        let found = SlopeFigures::of(both.into_iter().chain(more), 25.0, 5.0);
         assert_eq!((found.classes.0[0][5], found.classes.0[1][1], found.within), (1, 1, 1));
+        assert_eq!((found.only_one, found.judged()), ([2, 1], 5));
         assert!((found.rms_degrees - (1937.0_f64 / 2.0).sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_slope_that_one_does_not_have_fails_and_one_that_neither_has_is_untold() {
+        let (ground, none, slope) = (Some(5.0), None, Some([0.5, 0.0]));
+        assert_eq!(Slopes::of([ground; 2], [slope; 2]), Slopes::Both([[0.5, 0.0]; 2]));
+        assert_eq!(Slopes::of([ground; 2], [slope, None]), Slopes::One(0));
+        assert_eq!(Slopes::of([none, ground], [None, slope]), Slopes::One(1));
+        assert_eq!(Slopes::of([none, ground], [None; 2]), Slopes::One(1));
+        assert_eq!(Slopes::of([ground; 2], [None; 2]), Slopes::Untold);
     }
 
     #[test]

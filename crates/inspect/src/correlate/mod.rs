@@ -10,11 +10,14 @@ pub use surface::SurfaceFacts;
 mod places;
 mod shift;
 pub use shift::Shift;
+mod feet;
+pub use feet::Feet;
 mod heights;
 pub use heights::{DifferenceMap, HeightFigures, SLOPE_CLASSES, SLOPE_ENDS_DEGREES, SlopeFigures};
 mod found;
 pub use found::{ClassFigures, CorrelateRequest, Correlation, Criterion, SightFigures};
 mod criteria;
+mod holes;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,7 +31,8 @@ use load_module_reader::Standing;
 use schedule::Workers;
 
 use found::larger_spacing_m;
-use heights::Place;
+use heights::{Place, Slopes};
+use holes::has_ground_along;
 use places::{Common, Tell};
 use surface::{Ground, Surface};
 
@@ -83,7 +87,9 @@ pub fn correlate(
         places.judged.iter().filter_map(|(at, place)| Some((*at, place.difference_m()?))).collect();
     let both: Vec<[f64; 2]> = differences.iter().map(|(at, _)| *at).collect();
     let shift = shift::best_shift(&mut common, &both, apart_m)?;
-    let gradients = places.judged.iter().filter_map(|(_, place)| place.gradients);
+    let slopes = places.judged.iter().map(|(_, place)| place.slopes);
+    let looked = || pairs.judged.iter().map(|(_, looked)| *looked);
+    let told = looked().filter_map(|looked| if let Looked::Told(sights) = looked { Some(sights) } else { None });
     let mut found = Correlation {
         request: *request,
         common_m,
@@ -92,11 +98,13 @@ pub fn correlate(
         only_one,
         void_places: places.left_out,
         heights: HeightFigures::of(&differences, request.within_m),
+        feet: Feet::of(places.judged.iter().map(|(_, place)| place.heights_m), shift.as_ref()),
         shift,
-        slopes: SlopeFigures::of(gradients, apart_m, request.slope_within_degrees),
+        slopes: SlopeFigures::of(slopes, apart_m, request.slope_within_degrees),
         classes: by_class(&places.judged, &surfaces[0].classes, request.within_m),
         standing,
-        sights: tally_sights(pairs.judged.iter().map(|(_, sights)| *sights)),
+        sights: tally_sights(told),
+        only_one_pairs: [0, 1].map(|which| looked().filter(|looked| *looked == Looked::OverOne(which)).count() as u64),
         void_pairs: pairs.left_out,
         criteria: Vec::new(),
         causes: Vec::new(),
@@ -172,16 +180,22 @@ fn draw_places(
     seed: u64,
     apart_m: f64,
 ) -> Result<places::Drawn<[f64; 2], Place>, CompileError> {
-    let (size_m, [west, south, ..]) = (common.size_m(), common.rect_m);
+    let (size_m, [west, south, east, north]) = (common.size_m(), common.rect_m);
+    let half_m = 0.5 * apart_m;
+    let is_inside =
+        |[x, y]: [f64; 2]| west <= x - half_m && x + half_m <= east && south <= y - half_m && y + half_m <= north;
     let draw = |index: u64| {
         let [x, y] = Draw::new(seed, index).place(size_m);
         Some([west + x, south + y])
     };
     let look = |a: &Ground, b: &Ground, at: &[f64; 2]| {
         let heights_m = [a.height_m(*at), b.height_m(*at)];
-        let gradients = a.gradient(*at, apart_m).zip(b.gradient(*at, apart_m)).map(|(a, b)| [a, b]);
+        let slopes = match is_inside(*at) {
+            true => Slopes::of(heights_m, [a.gradient(*at, apart_m), b.gradient(*at, apart_m)]),
+            false => Slopes::Untold,
+        };
         let class = a.class(*at);
-        heights_m.iter().any(Option::is_some).then_some(Place { heights_m, class, gradients })
+        heights_m.iter().any(Option::is_some).then_some(Place { heights_m, class, slopes })
     };
     common.drawn("places", wanted, draw, |at| *at, look)
 }
@@ -189,23 +203,37 @@ fn draw_places(
 /// Whether A and B show the far end, at each height above the ground.
 type Sights = [[bool; 2]; SIGHT_HEIGHTS_M.len()];
 
+/// What a pair of places shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Looked {
+    Told(Sights),
+    /// Only this surface, 0 for A and 1 for B, has ground all along the line.
+    OverOne(usize),
+}
+
 fn draw_pairs(
     common: &mut Common<'_>,
     wanted: u64,
     request: &CorrelateRequest,
     standing: Standing,
-) -> Result<places::Drawn<[[f64; 2]; 2], Sights>, CompileError> {
+) -> Result<places::Drawn<[[f64; 2]; 2], Looked>, CompileError> {
     let (size_m, [west, south, ..], range_m) = (common.size_m(), common.rect_m, request.range_m);
     let draw = |index: u64| {
         let pair = Draw::new(request.seed, FIRST_PAIR + index).pair(size_m, [NEAREST_M, range_m])?;
         Some(pair.map(|[x, y]| [west + x, south + y]))
     };
     let look = |a: &Ground, b: &Ground, pair: &[[f64; 2]; 2]| {
+        match [a, b].map(|ground| has_ground_along(ground, *pair)) {
+            [true, true] => {}
+            [true, false] => return Some(Looked::OverOne(0)),
+            [false, true] => return Some(Looked::OverOne(1)),
+            [false, false] => return None,
+        }
         let mut sights = Sights::default();
         for (sight, above_m) in sights.iter_mut().zip(SIGHT_HEIGHTS_M) {
             *sight = [a.sees(*pair, above_m, standing)?, b.sees(*pair, above_m, standing)?];
         }
-        Some(sights)
+        Some(Looked::Told(sights))
     };
     common.drawn("lines of sight", wanted, draw, |pair| pair[0], look)
 }

@@ -254,6 +254,23 @@ fn height_of_posts_m(posts: &PostHeights, place_m: [f64; 2]) -> Option<f64> {
 fn is_free_over_posts(posts: &PostHeights, from_m: [f64; 3], to_m: [f64; 3]) -> Option<bool> {
     let from = in_posts(posts, [from_m[0], from_m[1]])?;
     let to = in_posts(posts, [to_m[0], to_m[1]])?;
+    let above = |share: f64| {
+        let place = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
+        height_at(posts, place).map(|height_m| height_m - (from_m[2] + share * (to_m[2] - from_m[2])))
+    };
+    let mut start = above(0.0)?;
+    for ends in cuts(from, to).windows(2) {
+        let (middle, end) = (above(0.5 * (ends[0] + ends[1]))?, above(ends[1])?);
+        if ROUNDING_M < highest(start, middle, end) {
+            return Some(false);
+        }
+        start = end;
+    }
+    Some(true)
+}
+
+/// Shares of a line between two places in posts at which it begins, crosses rows and columns of posts, and ends.
+pub(super) fn cuts(from: [f64; 2], to: [f64; 2]) -> Vec<f64> {
     let mut cuts = vec![0.0, 1.0];
     for axis in 0..2 {
         let (low, high) = (from[axis].min(to[axis]), from[axis].max(to[axis]));
@@ -263,19 +280,8 @@ fn is_free_over_posts(posts: &PostHeights, from_m: [f64; 3], to_m: [f64; 3]) -> 
     // Ends on a line of posts divide by nothing.
     cuts.retain(|cut| (0.0..=1.0).contains(cut));
     cuts.sort_by(f64::total_cmp);
-    let above = |share: f64| {
-        let place = [0, 1].map(|axis| from[axis] + share * (to[axis] - from[axis]));
-        height_at(posts, place).map(|height_m| height_m - (from_m[2] + share * (to_m[2] - from_m[2])))
-    };
-    let mut start = above(0.0)?;
-    for ends in cuts.windows(2).filter(|ends| ends[0] < ends[1]) {
-        let (middle, end) = (above(0.5 * (ends[0] + ends[1]))?, above(ends[1])?);
-        if ROUNDING_M < highest(start, middle, end) {
-            return Some(false);
-        }
-        start = end;
-    }
-    Some(true)
+    cuts.dedup();
+    cuts
 }
 
 /// The highest value of the parabola through three values at 0, one half and 1, between 0 and 1.
@@ -287,7 +293,7 @@ fn highest(start: f64, middle: f64, end: f64) -> f64 {
 }
 
 /// A place counted in posts from the south-west one, east then north; `None` outside.
-fn in_posts(posts: &PostHeights, place_m: [f64; 2]) -> Option<[f64; 2]> {
+pub(super) fn in_posts(posts: &PostHeights, place_m: [f64; 2]) -> Option<[f64; 2]> {
     let rows = posts.heights_m.len() / posts.cols;
     let place = [0, 1].map(|axis| (place_m[axis] - posts.south_west_m[axis]) / posts.spacing_m[axis]);
     let is_inside = |at: f64, count: usize| (0.0..=(count - 1) as f64).contains(&at);
@@ -295,7 +301,7 @@ fn in_posts(posts: &PostHeights, place_m: [f64; 2]) -> Option<[f64; 2]> {
 }
 
 /// Height at a place in posts; `None` where a post that counts is void.
-fn height_at(posts: &PostHeights, place: [f64; 2]) -> Option<f64> {
+pub(super) fn height_at(posts: &PostHeights, place: [f64; 2]) -> Option<f64> {
     let rows = posts.heights_m.len() / posts.cols;
     let first = |at: f64, count: usize| (at.max(0.0) as usize).min(count.saturating_sub(2));
     let (col, row) = (first(place[0], posts.cols), first(place[1], rows));

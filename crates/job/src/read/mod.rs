@@ -187,6 +187,9 @@ fn read_tiles(tiles: &Section, grid: &ModuleGrid) -> Result<TilesSpec, JobError>
     }
 }
 
+/// Tiles along a side of the area where it has room for them, as the table of keys says.
+const USUAL_TILES: u32 = 6;
+
 /// How many tiles there are along one side of the area: as the job says, or the usual number, fewer where they
 /// would be too narrow.
 fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
@@ -194,9 +197,9 @@ fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
     let what = format!("tiles of {modules} load modules, at least two each");
     match tiles.optional(key) {
         Some(entry) => entry.whole_in(&(1..=most.into()), &what).map(in_32_bits).map_err(|error| match error {
-            // The usual number may be more than there can be here.
-            JobError::OutOfRange(fault) => {
-                JobError::OutOfRange(Box::new(Fault { hint: format!("at most {key} = {most}"), ..*fault }))
+            // The usual number is more than there can be here.
+            JobError::OutOfRange(fault) if most < USUAL_TILES => {
+                JobError::OutOfRange(Box::new(Fault { hint: format!("for example {key} = {most}"), ..*fault }))
             }
             error => error,
         }),

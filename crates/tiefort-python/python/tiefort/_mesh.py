@@ -46,7 +46,7 @@ class Mesh:
     Attributes
     ----------
     vertices : ndarray of float64, shape (n, 3)
-        East, north and height of each, in metres.
+        East, north and height of each, in metres; read-only, as are triangles and classes of what tiefort made.
     triangles : ndarray of uint32, shape (m, 3)
         Vertices of each, counter-clockwise seen from above.
     residual : Residual
@@ -75,6 +75,12 @@ class Mesh:
         exported: list[str] | None = None,
         classes: npt.NDArray[np.uint8] | None = None,
     ) -> None:
+        if tin is not None or exported is not None:
+            # Copies of what save and sample read: a change here would not reach them.
+            copies: list[npt.NDArray[Any] | None] = [vertices, triangles, classes]
+            for array in copies:
+                if array is not None:
+                    array.flags.writeable = False
         self.vertices = vertices
         self.triangles = triangles
         self.residual = residual
@@ -148,14 +154,14 @@ class Mesh:
         """Return a ``trimesh.Trimesh``, in metres on the map."""
         import trimesh
 
-        return trimesh.Trimesh(self.vertices, self.triangles.astype(np.int64), process=False)
+        return trimesh.Trimesh(self.vertices.copy(), self.triangles.astype(np.int64), process=False)
 
     def to_pyvista(self) -> PolyData:
         """Return a ``pyvista.PolyData``, in metres on the map."""
         import pyvista
 
         faces = np.column_stack((np.full(len(self.triangles), 3), self.triangles.astype(np.int64)))
-        mesh = pyvista.PolyData(self.vertices, faces.ravel())
+        mesh = pyvista.PolyData(self.vertices.copy(), faces.ravel())
         if self.classes is not None:
             mesh.cell_data["class"] = self.classes
         return mesh
@@ -164,8 +170,8 @@ class Mesh:
         """Return a ``meshio.Mesh``, in metres on the map."""
         import meshio
 
-        data = None if self.classes is None else {"class": [self.classes]}
-        return meshio.Mesh(self.vertices, [("triangle", self.triangles.astype(np.int64))], cell_data=data)
+        data = None if self.classes is None else {"class": [self.classes.copy()]}
+        return meshio.Mesh(self.vertices.copy(), [("triangle", self.triangles.astype(np.int64))], cell_data=data)
 
     def to_geopandas(self) -> GeoDataFrame:
         """Return a ``geopandas.GeoDataFrame`` with a polygon of three corners for each triangle."""

@@ -28,8 +28,8 @@ Examples:
 
 Places are drawn at random over what both reach, as many as a plan of acceptance
 sampling needs. Each of these is accepted or not: heights, slopes, and lines of
-sight 1, 2.5 and 10 m above the ground. A place where only one has ground does
-not agree; one where neither has is drawn again.
+sight 1, 2.5 and 10 m above the ground. A place where only one has ground, and
+a line over a hole of one, does not agree; over a hole of both it is drawn again.
 
 Exit codes: 0 accepted; 1 not accepted; 2 nothing to compare.";
 
@@ -178,10 +178,19 @@ fn to_json(found: &Correlation) -> Value {
             "ground_in_a_only": found.only_one[0],
             "ground_in_b_only": found.only_one[1],
             "void_in_both": found.void_places,
+            "slopes_in_a_only": found.slopes.only_one[0],
+            "slopes_in_b_only": found.slopes.only_one[1],
+            "pairs_over_ground_of_a_only": found.only_one_pairs[0],
+            "pairs_over_ground_of_b_only": found.only_one_pairs[1],
             "pairs_left_out": found.void_pairs,
         },
         "heights": heights(&found.heights),
         "shift": found.shift.as_ref().map(|shift| shift_json(shift, found)),
+        "feet": found.feet.map(|feet| json!({
+            "in": if feet.which == 0 { "a" } else { "b" },
+            "rms_before": feet.rms[0],
+            "rms_after": feet.rms[1],
+        })),
         "slopes": {
             "apart_m": found.slopes.apart_m,
             "ends_degrees": SLOPE_ENDS_DEGREES,

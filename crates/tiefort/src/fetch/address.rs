@@ -74,6 +74,12 @@ impl Address {
         &self.url
     }
 
+    /// The host, with its port where it has one.
+    pub fn host(&self) -> &str {
+        let rest = self.url.split_once("://").map_or(self.url.as_str(), |(_, rest)| rest);
+        rest.split(['/', '?']).next().unwrap_or_default()
+    }
+
     /// The bucket that the job named it by, whose owner may want a signature.
     pub fn bucket(&self) -> Option<&str> {
         self.bucket.as_ref().map(|(name, _)| name.as_str())

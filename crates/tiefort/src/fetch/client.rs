@@ -1,17 +1,18 @@
 //! One range of bytes over HTTP, with redirects, retries, and a sentence for all that servers do wrong.
 
-use std::collections::BTreeSet;
-use std::io::Read;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{self, Read};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use ureq::Agent;
 use ureq::http::{HeaderMap, Response};
+use ureq::{Agent, Timeout};
 
 use super::address::Address;
 use super::fault::{Fault, changed};
 use super::s3::{Credentials, Listed, fits, listed};
+use super::silence::{Heard, Silence};
 use crate::clock::now;
 
 /// Requests at a time, whatever they are for.
@@ -24,9 +25,8 @@ const LIST_BYTES_MAX: u64 = 4 << 20;
 const TRIES: u32 = 5;
 /// Redirects that are followed, at most.
 const REDIRECTS: usize = 5;
-/// Seconds until a server is there, and for the answer to one request.
-const CONNECT: Duration = Duration::from_secs(20);
-const ANSWER: Duration = Duration::from_secs(180);
+/// Times that a range is asked for, at most, of a server that is silent.
+const SILENT_TRIES: u32 = 3;
 /// The pause before the second try; before each other it is twice that before.
 const PAUSE: Duration = Duration::from_millis(250);
 
@@ -41,8 +41,26 @@ pub struct Answer {
     pub etag: String,
 }
 
+/// How long a server is waited for.
+#[derive(Clone, Copy, Debug)]
+pub struct Patience {
+    /// Until its name is found, and again until it is connected.
+    pub connect: Duration,
+    /// While it sends no byte.
+    pub silence: Duration,
+}
+
+impl Patience {
+    /// A server that is at work on an answer sends its head within seconds; the rest may come as slowly as it will.
+    pub const USUAL: Self = Self { connect: Duration::from_secs(10), silence: Duration::from_secs(30) };
+}
+
 /// What asks.
 pub struct Client<'a> {
+    patience: Patience,
+    silence: Arc<Silence>,
+    /// Hosts that were given up, and why.
+    given_up: Mutex<BTreeMap<String, Fault>>,
     agent: Agent,
     /// Of this machine's own servers.
     direct: Agent,
@@ -57,11 +75,12 @@ pub struct Client<'a> {
     closed: Mutex<BTreeSet<String>>,
 }
 
-/// Leave to make a request.
-struct Leave<'c>(&'c (Mutex<usize>, Condvar));
+/// Leave to ask for one thing, several times if need be.
+struct Leave<'c>(&'c (Mutex<usize>, Condvar), &'c Silence);
 
 impl Drop for Leave<'_> {
     fn drop(&mut self) {
+        self.1.end();
         *locked(&self.0.0) += 1;
         self.0.1.notify_one();
     }
@@ -73,19 +92,29 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl<'a> Client<'a> {
     /// A client that ends early once `stop` is raised; `variable` gives variables of the environment.
-    pub fn new(stop: &'a AtomicBool, variable: &'a (dyn Fn(&str) -> Option<String> + Sync)) -> Self {
+    pub fn new(
+        stop: &'a AtomicBool,
+        variable: &'a (dyn Fn(&str) -> Option<String> + Sync),
+        patience: Patience,
+    ) -> Self {
         let config = || {
             Agent::config_builder()
                 .http_status_as_error(false)
                 // They are followed here, where each is judged.
                 .max_redirects(0)
                 .user_agent(concat!("tiefort/", env!("CARGO_PKG_VERSION")))
-                .timeout_connect(Some(CONNECT))
-                .timeout_global(Some(ANSWER))
+                .timeout_resolve(Some(patience.connect))
+                .timeout_connect(Some(patience.connect))
+                .timeout_per_write(Some(patience.silence))
+                // A file of gigabytes takes its time; what counts is that it goes on coming.
+                .timeout_per_read(Some(patience.silence))
                 .max_idle_connections_per_host(8)
         };
         let (agent, direct) = (config().build().into(), config().proxy(None).build().into());
         Self {
+            patience,
+            silence: Arc::default(),
+            given_up: Mutex::default(),
             agent,
             direct,
             stop,
@@ -100,6 +129,11 @@ impl<'a> Client<'a> {
     /// Bytes of bodies that have come.
     pub fn received(&self) -> u64 {
         self.received.load(Ordering::Relaxed)
+    }
+
+    /// What tells whether servers send something.
+    pub fn silence(&self) -> &Arc<Silence> {
+        &self.silence
     }
 
     /// Raised when the work is to end.
@@ -125,11 +159,11 @@ impl<'a> Client<'a> {
         loop {
             let variable = |name: &str| (self.variable)(name);
             let address = Address::of_list(bucket, prefix, token.as_deref(), &variable)?;
-            let text = self.trying(|| {
-                let (response, _leave) = self.ask(&address, None)?;
+            let text = self.trying(&address, || {
+                let response = self.ask(&address, None)?;
                 let mut text = String::new();
-                let read = response.into_body().into_reader().take(LIST_BYTES_MAX).read_to_string(&mut text);
-                read.map_err(|error| Fault::passing(format!("{address}: {error}")))?;
+                let read = self.heard(response).take(LIST_BYTES_MAX).read_to_string(&mut text);
+                read.map_err(|error| self.unread(&address, &error))?;
                 Ok(text)
             })?;
             let (files, next) = listed(&text).ok_or_else(|| {
@@ -162,8 +196,8 @@ impl<'a> Client<'a> {
     /// # Errors
     /// When the server does not give them, or another version, after several tries.
     pub fn range(&self, address: &Address, start: u64, len: u64, etag: Option<&str>) -> Result<Answer, Fault> {
-        self.trying(|| {
-            let (response, _leave) = self.ask(address, Some((start, len)))?;
+        self.trying(address, || {
+            let response = self.ask(address, Some((start, len)))?;
             let (status, headers) = (response.status().as_u16(), response.headers().clone());
             if status == 200 {
                 let hint = "fetch the file by other means, and name it by its path";
@@ -188,8 +222,8 @@ impl<'a> Client<'a> {
     /// # Errors
     /// When it does not give the file at all.
     pub fn look(&self, address: &Address) -> Result<(bool, Option<u64>, String), Fault> {
-        self.trying(|| {
-            let (response, _leave) = self.ask(address, Some((0, 1)))?;
+        self.trying(address, || {
+            let response = self.ask(address, Some((0, 1)))?;
             let headers = response.headers();
             let etag = text(headers, "etag");
             match response.status().as_u16() {
@@ -214,11 +248,10 @@ impl<'a> Client<'a> {
         total: u64,
         put: &mut dyn FnMut(&[u8]) -> Result<(), Fault>,
     ) -> Result<(), Fault> {
-        let (response, _leave) = self.ask(address, None)?;
-        let (mut reader, mut left) = (response.into_body().into_reader(), total);
+        let (mut reader, mut left) = (self.heard(self.ask(address, None)?), total);
         let mut buffer = vec![0; 1 << 16];
         loop {
-            let read = reader.read(&mut buffer).map_err(|error| Fault::passing(format!("{address}: {error}")))?;
+            let read = reader.read(&mut buffer).map_err(|error| self.unread(address, &error))?;
             self.stopped()?;
             self.received.fetch_add(read as u64, Ordering::Relaxed);
             match read as u64 {
@@ -231,22 +264,32 @@ impl<'a> Client<'a> {
         }
     }
 
-    /// Asks several times where that may help.
+    /// Asks several times where that may help, once there are few enough at work. A host that does not answer is given
+    /// up for all that is asked of it.
     ///
     /// # Errors
-    /// That of the last try, or of the first that another would not mend.
-    pub fn trying<T>(&self, ask: impl Fn() -> Result<T, Fault>) -> Result<T, Fault> {
-        let mut pause = PAUSE;
-        for _ in 1..TRIES {
+    /// That of the last try, or of the first that another would not mend; why the host was given up.
+    pub fn trying<T>(&self, address: &Address, ask: impl Fn() -> Result<T, Fault>) -> Result<T, Fault> {
+        let _leave = self.leave(address.host());
+        let (mut pause, mut tries, mut silences) = (PAUSE, 0, 0);
+        loop {
             self.stopped()?;
-            match ask() {
-                Err(fault) if fault.may_pass() => {}
+            if let Some(fault) = locked(&self.given_up).get(address.host()) {
+                return Err(fault.clone());
+            }
+            let fault = match ask() {
+                Err(fault) if fault.may_pass() => fault,
                 end => return end,
+            };
+            tries += 1;
+            silences += u32::from(fault.is_silent());
+            if tries == TRIES || silences == SILENT_TRIES {
+                locked(&self.given_up).entry(address.host().to_owned()).or_insert(fault.clone());
+                return Err(fault);
             }
             std::thread::sleep(pause);
             pause *= 2;
         }
-        ask()
     }
 
     fn stopped(&self) -> Result<(), Fault> {
@@ -256,15 +299,15 @@ impl<'a> Client<'a> {
         }
     }
 
-    /// One answer of 200 or 206, redirects followed, once there are few enough at work; `Leave` ends with the answer.
-    fn ask(&self, address: &Address, range: Option<(u64, u64)>) -> Result<(Response<ureq::Body>, Leave<'_>), Fault> {
-        let leave = self.leave();
+    /// One answer of 200 or 206, redirects followed.
+    fn ask(&self, address: &Address, range: Option<(u64, u64)>) -> Result<Response<ureq::Body>, Fault> {
         let mut at = address.clone();
         for _ in 0..=REDIRECTS {
             let is_signed = at.bucket().is_some_and(|bucket| locked(&self.closed).contains(bucket));
-            let response = self.one(&at, range, is_signed).map_err(|error| transport(address, &error))?;
+            let response = self.one(&at, range, is_signed).map_err(|error| self.transport(address, &error))?;
+            self.silence.heard();
             match response.status().as_u16() {
-                200 | 206 => return Ok((response, leave)),
+                200 | 206 => return Ok(response),
                 301 | 302 | 303 | 307 | 308 => at = at.redirected(&text(response.headers(), "location"))?,
                 401 | 403 if !is_signed && self.closes(&at) => {}
                 status => return Err(refused(address, status)),
@@ -273,11 +316,12 @@ impl<'a> Client<'a> {
         Err(Fault::last(format!("{address}: it leads on more than {REDIRECTS} times")))
     }
 
-    fn leave(&self) -> Leave<'_> {
+    fn leave(&self, host: &str) -> Leave<'_> {
         let (free, told) = &self.free;
         let mut free = told.wait_while(locked(free), |free| *free == 0).unwrap_or_else(PoisonError::into_inner);
         *free -= 1;
-        Leave(&self.free)
+        self.silence.begin(host);
+        Leave(&self.free, &self.silence)
     }
 
     /// One request, signed or not.
@@ -296,8 +340,7 @@ impl<'a> Client<'a> {
         }
         match range {
             Some((start, len)) => request.header("Range", format!("bytes={start}-{}", start + len - 1)).call(),
-            // A file of gigabytes takes its time; what counts is that it goes on coming.
-            None => request.config().timeout_global(None).timeout_per_read(Some(CONNECT)).build().call(),
+            None => request.call(),
         }
     }
 
@@ -311,14 +354,48 @@ impl<'a> Client<'a> {
     /// A body of exactly `len` bytes.
     fn body(&self, address: &Address, response: Response<ureq::Body>, len: u64) -> Result<Vec<u8>, Fault> {
         let mut bytes = Vec::with_capacity(len as usize);
-        let read = response.into_body().into_reader().take(len + 1).read_to_end(&mut bytes);
+        let read = self.heard(response).take(len + 1).read_to_end(&mut bytes);
         self.received.fetch_add(bytes.len() as u64, Ordering::Relaxed);
         let found = bytes.len() as u64;
         match read {
             _ if len < found => Err(endless(address, len)),
+            Err(error) if is_timeout(&error) => Err(self.silent(address)),
             _ if found < len => Err(cut(address, found, len)),
-            Err(error) => Err(Fault::passing(format!("{address}: {error}"))),
+            Err(error) => Err(self.unread(address, &error)),
             Ok(_) => Ok(bytes),
+        }
+    }
+
+    fn heard(&self, response: Response<ureq::Body>) -> Heard<'_, ureq::BodyReader<'static>> {
+        Heard { body: response.into_body().into_reader(), silence: &self.silence }
+    }
+
+    /// Why a body was not read to its end.
+    fn unread(&self, address: &Address, error: &io::Error) -> Fault {
+        match is_timeout(error) {
+            true => self.silent(address),
+            false => Fault::passing(format!("{address}: {error}")),
+        }
+    }
+
+    fn silent(&self, address: &Address) -> Fault {
+        let seconds = self.patience.silence.as_secs();
+        Fault::silent(format!("{address}: no byte came for {seconds} s, in {SILENT_TRIES} tries"))
+    }
+
+    /// What the library says, which may hold the address with its signature.
+    fn transport(&self, address: &Address, error: &ureq::Error) -> Fault {
+        match error {
+            ureq::Error::Timeout(Timeout::Resolve | Timeout::Connect) => {
+                let seconds = self.patience.connect.as_secs();
+                Fault::silent(format!("{address}: no connection within {seconds} s, in {SILENT_TRIES} tries"))
+            }
+            ureq::Error::Timeout(_) => self.silent(address),
+            error => {
+                let said = error.to_string().replace(address.url(), &address.to_string());
+                let said = said.split('?').next().unwrap_or_default().to_owned();
+                Fault::passing(format!("{address}: {said}"))
+            }
         }
     }
 }
@@ -381,9 +458,51 @@ fn refused(address: &Address, status: u16) -> Fault {
     }
 }
 
-/// What the library says, which may hold the address with its signature.
-fn transport(address: &Address, error: &ureq::Error) -> Fault {
-    let said = error.to_string().replace(address.url(), &address.to_string());
-    let said = said.split('?').next().unwrap_or_default().to_owned();
-    Fault::passing(format!("{address}: {said}"))
+/// Whether a body was not read because nothing came; the library wraps its own error.
+fn is_timeout(error: &io::Error) -> bool {
+    let inner = error.get_ref().and_then(|inner| inner.downcast_ref::<ureq::Error>());
+    matches!(inner, Some(ureq::Error::Timeout(_)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+    use std::net::TcpListener;
+    use std::time::Instant;
+
+    use super::*;
+
+    /// Asks a server that sends so much and then nothing more for two ranges at once; how it ends, and how many asked.
+    fn asked(sent: &'static str) -> ([String; 2], usize) {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("http://{}/a.tif", listener.local_addr().unwrap());
+        let asked = Arc::new(Mutex::new(Vec::new()));
+        let held = Arc::clone(&asked);
+        std::thread::spawn(move || {
+            for mut stream in listener.incoming().flatten() {
+                let _ = stream.write_all(sent.as_bytes());
+                locked(&held).push(stream);
+            }
+        });
+        let (stop, variable) = (AtomicBool::new(false), |_: &str| None);
+        let patience = Patience { connect: Duration::from_secs(5), silence: Duration::from_millis(200) };
+        let client = Client::new(&stop, &variable, patience);
+        let address = client.address(&url).unwrap();
+        let start = Instant::now();
+        let faults = [0, 10].map(|start| client.range(&address, start, 10, None).unwrap_err().text);
+        assert!(start.elapsed() < Duration::from_secs(20));
+        let count = locked(&asked).len();
+        (faults, count)
+    }
+
+    #[test]
+    fn a_silent_server_is_given_up_after_three_tries_also_for_what_is_asked_later() {
+        const HEAD: &str = "HTTP/1.1 206 Partial Content\r\nContent-Length: 10\r\n\
+                            Content-Range: bytes 0-9/99\r\n\r\n1234";
+        for sent in ["", "HTTP/1.1 206 Par", HEAD] {
+            let (faults, count) = asked(sent);
+            assert!(faults[0].contains("no byte came for 0 s, in 3 tries"), "{sent:?}: {faults:?}");
+            assert_eq!((&faults[0], count), (&faults[1], 3), "{sent:?}");
+        }
+    }
 }

@@ -17,6 +17,8 @@ enum Kind {
     Last,
     /// The same request may succeed later.
     Passing,
+    /// The server is silent, and may answer later.
+    Silent,
     /// The server has another version.
     Changed,
 }
@@ -34,12 +36,22 @@ impl Fault {
 
     /// Whether the same request may succeed later.
     pub fn may_pass(&self) -> bool {
-        self.kind == Kind::Passing
+        matches!(self.kind, Kind::Passing | Kind::Silent)
     }
 
     /// Whether the server has another version than is wanted.
     pub fn is_change(&self) -> bool {
         self.kind == Kind::Changed
+    }
+
+    /// Whether the server sent nothing for as long as it is waited for.
+    pub fn is_silent(&self) -> bool {
+        self.kind == Kind::Silent
+    }
+
+    /// A server that sends nothing.
+    pub fn silent(text: String) -> Self {
+        Self { kind: Kind::Silent, ..Self::passing(text) }
     }
 
     /// One that may pass.

@@ -4,6 +4,7 @@
 //!   address    what a job names ─► what is asked for over HTTP
 //!   s3         buckets: signatures and lists
 //!   client     one range of bytes, with redirects, retries and what servers do wrong
+//!   silence    what a person is told while no server sends anything
 //!   plan       which ranges of which files an area needs; their bytes as a `Read + Seek` for their directories
 //!   pieces     ranges on the disk: what came before a cut is kept
 //!   run        all files of a job, each brought under its final name, and its lock
@@ -17,5 +18,6 @@ mod pieces;
 mod plan;
 mod run;
 mod s3;
+mod silence;
 
 pub use run::{Options, fetch};

@@ -15,17 +15,18 @@ use schedule::Workers;
 use source_files::GeoParquet;
 use store::engine::Fingerprint;
 
-use super::client::{Client, REQUESTS};
+use super::client::{Client, Patience, REQUESTS};
 use super::fault::Fault;
 use super::pieces::Piece;
 use super::plan::{Kept, Planned, What, disk, kept, plan, stopped_or};
+use super::silence;
 use crate::catalogue::{Catalogue, catalogue};
 use crate::clock::today;
 use crate::failure::{Failure, Outcome};
 use crate::files::bytes_text;
 use crate::signals::Signals;
 use crate::steps::Steps;
-use crate::{files, terminal};
+use crate::{files, signals, terminal};
 
 /// What is to be fetched, and how.
 pub struct Options {
@@ -63,12 +64,30 @@ pub fn fetch(options: &Options) -> Result<Outcome, Failure> {
     }
     let signals = Signals::watch()?;
     let variable = |name: &str| std::env::var(name).ok();
-    let client = Client::new(signals.stop(), &variable);
+    let client = Client::new(signals.stop(), &variable, Patience::USUAL);
+    if !options.quiet {
+        silence::watch(client.silence(), terminal::tell);
+    }
+    // A request that waits for its server does not look at the flag.
+    signals.end_in_time(|| signals::stopped("stopped", "run the same command again: what has come is kept"));
+    let fetched = fetch_all(options, &job, &known, &named, (&client, &signals));
+    // From here on this thread says how the process ends.
+    signals.tell_once(|| {});
+    fetched
+}
+
+fn fetch_all(
+    options: &Options,
+    job: &Job,
+    known: &Catalogue,
+    named: &[(NamedFile, PathBuf)],
+    (client, signals): (&Client, &Signals),
+) -> Result<Outcome, Failure> {
     let failed = |fault: Fault| Failure::new(&fault.text, fault.hint).after(signals.exit_code());
     let lock = Lock::read(&job.path)?.unwrap_or_default();
-    let tasks = tasks(&client, &job, &named, &lock, options.update).map_err(failed)?;
+    let tasks = tasks(client, job, named, &lock, options.update).map_err(failed)?;
     let left = tasks.iter().map(|task| if let Task::Fetch(planned) = task { planned.left() } else { 0 }).sum();
-    tell_plan(&tasks, left, &job)?;
+    tell_plan(&tasks, left, job)?;
     if options.dry_run {
         return Ok(Outcome::Sound);
     }
@@ -77,7 +96,7 @@ pub fn fetch(options: &Options) -> Result<Outcome, Failure> {
         return Err(Failure::new(message, "--max-gb allows more; a coarser spacing_m needs fewer"));
     }
     files::make_folder(&Lock::folder(&job.path))?;
-    bring_all(&client, &job, tasks, &known, (options.quiet, left)).map_err(failed)?;
+    bring_all(client, job, tasks, known, (options.quiet, left)).map_err(failed)?;
     let (place, path, came) = (Lock::place(&job.path), job.path.display(), bytes_text(client.received()));
     terminal::print(&format!("{came} came; {} says what; build it: tiefort build {path}\n", place.display()))?;
     Ok(Outcome::Sound)
@@ -291,7 +310,7 @@ fn pieces(client: &Client, planned: &Planned, told: &(dyn Fn(u64) + Sync)) -> Re
 
 /// Brings a file from a server that gives no ranges: it begins anew where it was cut.
 fn in_one_answer(client: &Client, planned: &Planned, half: &Path, told: &(dyn Fn(u64) + Sync)) -> Result<(), Fault> {
-    client.trying(|| {
+    client.trying(&planned.remotes[0].address, || {
         let mut out = File::create(half).map_err(|error| disk(half, &error))?;
         client.whole(&planned.remotes[0].address, planned.total, &mut |bytes| {
             told(bytes.len() as u64);

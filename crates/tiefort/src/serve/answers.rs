@@ -250,7 +250,7 @@ pub async fn module_file(
     let read = move || {
         served.ask(|snapshot| {
             if let Some(of_tile) = snapshot.contents.files.iter().find(|of_tile| file_name(of_tile) == file) {
-                return tile_file(of_tile, &headers);
+                return tile_file(snapshot, of_tile, &headers);
             }
             let id = module_id(&file).ok_or_else(|| no_file(&file))?;
             let of_tile = snapshot.contents.files.iter().find(|of_tile| of_tile.block.contains(id.row, id.col));
@@ -274,8 +274,8 @@ fn module_id(file: &str) -> Option<ModuleId> {
     (format!("r{:04}c{:04}.slm", id.row, id.col) == file).then_some(id)
 }
 
-/// The bytes of a file that are asked for, as they lie on the disk.
-fn tile_file(of_tile: &TileModulesFile, headers: &HeaderMap) -> Answer {
+/// The bytes of a file that are asked for, as they lie on the disk, once the file was found to be the one of the build.
+fn tile_file(snapshot: &Snapshot, of_tile: &TileModulesFile, headers: &HeaderMap) -> Answer {
     let tag = files::tag(of_tile.stamp.blake3);
     if files::is_known(headers, &tag) {
         return Ok(files::known(&tag));
@@ -286,6 +286,7 @@ fn tile_file(of_tile: &TileModulesFile, headers: &HeaderMap) -> Answer {
         Part::Whole => (0, length),
         Part::Bytes(first, last) => (first, last + 1),
     };
+    snapshot.contents.check(of_tile).map_err(Refusal::of)?;
     let read = || {
         let mut file = File::open(&of_tile.path)?;
         file.seek(SeekFrom::Start(first))?;
@@ -296,6 +297,8 @@ fn tile_file(of_tile: &TileModulesFile, headers: &HeaderMap) -> Answer {
         let error = format!("{}: cannot be read: {error}", of_tile.path.display());
         Refusal::later(error, "`tiefort verify` says what is damaged")
     })?;
+    // What was read is what was checked, unless another file came between.
+    snapshot.contents.check(of_tile).map_err(Refusal::of)?;
     Ok(part.answer(&tag, length, bytes.into()))
 }
 

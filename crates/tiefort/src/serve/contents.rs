@@ -2,6 +2,8 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
 use load_module_reader::{AreaFrame, Block, Keep, TileFile};
 use store::{FileStamp, Fingerprint, Folder, Manifest};
@@ -12,6 +14,28 @@ use crate::failure::{Cause, Failure};
 /// The name of the record.
 pub const RECORD: &str = "database.json";
 
+/// How a file looked: every change of it is a new file, or has another time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileLook {
+    modified: Option<SystemTime>,
+    length: u64,
+    #[cfg(unix)]
+    inode: u64,
+}
+
+impl FileLook {
+    /// `None` where there is none.
+    pub fn of(path: &Path) -> Option<Self> {
+        let found = fs::metadata(path).ok()?;
+        Some(Self {
+            modified: found.modified().ok(),
+            length: found.len(),
+            #[cfg(unix)]
+            inode: std::os::unix::fs::MetadataExt::ino(&found),
+        })
+    }
+}
+
 /// The file of a tile's load modules.
 pub struct TileModulesFile {
     pub tile: TileId,
@@ -20,6 +44,8 @@ pub struct TileModulesFile {
     pub block: Block,
     /// How it must look.
     pub stamp: FileStamp,
+    /// How it looked when it was found to be the one of this build.
+    sound: Mutex<Option<FileLook>>,
 }
 
 /// What a database holds.
@@ -53,11 +79,31 @@ impl Contents {
             let header = file.header();
             let block = Block { south: header.south, west: header.west, north: header.north, east: header.east };
             frame.get_or_insert_with(|| AreaFrame::of(header));
-            files.push(TileModulesFile { tile: tile.tile(), path, block, stamp });
+            files.push(TileModulesFile { tile: tile.tile(), path, block, stamp, sound: Mutex::default() });
         }
         let frame = frame.ok_or_else(|| damaged(&"found no load modules, expected some"))?;
         let fingerprint = Fingerprint::of_bytes(&bytes);
         Ok(Self { folder: folder.to_path_buf(), manifest, fingerprint, frame, files })
+    }
+
+    /// Checks that a file is the one of this build, byte by byte unless it looks as it did when it was found to be.
+    ///
+    /// # Errors
+    /// When it is missing, damaged or of another build.
+    pub fn check(&self, file: &TileModulesFile) -> Result<(), Failure> {
+        // Others wait: it is read once however many ask.
+        let mut sound = file.sound.lock().unwrap_or_else(PoisonError::into_inner);
+        let look = FileLook::of(&file.path);
+        if look.is_some() && *sound == look {
+            return Ok(());
+        }
+        let folder = Folder::new(&self.folder);
+        if let Err(other) = folder.check_modules(&self.manifest, file.tile) {
+            // Reading it tells what is damaged; what is sound is of another build.
+            return Err(folder.read_levels(&self.manifest, file.tile).err().unwrap_or(other).into());
+        }
+        *sound = look;
+        Ok(())
     }
 }
 

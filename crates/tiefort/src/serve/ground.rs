@@ -7,7 +7,7 @@ use axum::http::StatusCode;
 use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, TileFile};
 use lru::LruCache;
 
-use super::contents::Contents;
+use super::contents::{Contents, TileModulesFile};
 use super::refusal::Refusal;
 
 /// Load modules along a side of a block.
@@ -158,9 +158,11 @@ fn load(of: &Contents, (level, row, col): Key) -> Result<LoadedGround, Refusal> 
     let touches = |file: &Block| {
         file.south < block.north && block.south < file.north && file.west < block.east && block.west < file.east
     };
-    let files = of.files.iter().filter(|file| touches(&file.block));
+    let files: Vec<&TileModulesFile> = of.files.iter().filter(|file| touches(&file.block)).collect();
+    files.iter().try_for_each(|file| of.check(file)).map_err(Refusal::of)?;
     let open = || {
-        let files = files.map(|file| TileFile::open(&file.path, Keep::OnDisk)).collect::<Result<_, ReadError>>()?;
+        let files =
+            files.iter().map(|file| TileFile::open(&file.path, Keep::OnDisk)).collect::<Result<_, ReadError>>()?;
         Area::of_files(files)?.load_level(block, level)
     };
     open().map_err(|error| Refusal::later(error.to_string(), "`tiefort verify` says what is damaged"))

@@ -74,9 +74,10 @@ fn get(summary: &str, description: &str, parameters: &[&str], kinds: &[(&str, &s
         "parameters": parameters.iter().map(|name| in_path(name)).collect::<Vec<_>>(),
         "responses": {
             "200": { "description": said.join(", "), "content": content },
+            "403": { "description": OTHER_HOST },
             "404": { "description": "no such database or file" },
             "409": { "description": "what the database holds does not allow it: error says why" },
-            "503": { "description": "the database is being built, or not there: ask again" },
+            "503": { "description": "the database is being built, damaged or not there: error says which" },
         },
     })
 }
@@ -129,10 +130,12 @@ fn query(summary: &str, description: &str, query: &[Value], json_body: Value, ra
                 "content": { "application/json": answer, "application/octet-stream": raw_kind(raw[1]) },
             },
             "400": { "description": "a body that cannot be read: error says where, hint what to send" },
+            "403": { "description": OTHER_HOST },
             "408": { "description": "a body that came too slowly" },
             "413": { "description": "a body that is too large" },
+            "415": { "description": "a body that is neither JSON nor raw numbers, as its Content-Type says" },
             "422": { "description": "a line of sight that is too long" },
-            "503": { "description": "the database is being built, or not there: ask again" },
+            "503": { "description": "the database is being built, damaged or not there: error says which" },
         },
     })
 }
@@ -251,6 +254,7 @@ fn line_of_sight() -> Value {
     )
 }
 
+const OTHER_HOST: &str = "a request under another name than this machine's own, unless --host opens the service";
 const OBJECTS: &str = "which objects are looked at: all, buildings (with walls) or none";
 const TOPS: &str = "of what heights are: none, the ground; buildings, the highest of ground, decks and roofs; all, \
     with the tops of woods and rows";

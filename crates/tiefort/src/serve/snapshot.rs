@@ -4,44 +4,20 @@
 //! both looks found the same finished record. Where it changed, the database is opened again; while a build is at work,
 //! the answer is to ask later.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::SystemTime;
 
 use exports::Datum;
 
-use super::contents::{Contents, RECORD};
+use super::contents::{Contents, FileLook, RECORD};
 use super::globe::Globes;
 use super::ground::Ground;
 use super::refusal::Refusal;
 use crate::failure::Failure;
 
-/// How the record of a build looked: every change of it is a new file.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Record {
-    modified: Option<SystemTime>,
-    length: u64,
-    #[cfg(unix)]
-    inode: u64,
-}
-
-impl Record {
-    /// `None` where there is none.
-    fn look(folder: &Path) -> Option<Self> {
-        let found = fs::metadata(folder.join(RECORD)).ok()?;
-        Some(Self {
-            modified: found.modified().ok(),
-            length: found.len(),
-            #[cfg(unix)]
-            inode: std::os::unix::fs::MetadataExt::ino(&found),
-        })
-    }
-}
-
 /// A database as one build left it.
 pub struct Snapshot {
-    record: Option<Record>,
+    record: Option<FileLook>,
     pub contents: Contents,
     /// Load modules in memory.
     pub ground: Ground,
@@ -52,14 +28,14 @@ pub struct Snapshot {
 impl Snapshot {
     fn open(folder: &Path, assumed: Option<Datum>) -> Result<Self, Failure> {
         // Looked at before anything is read: what changes meanwhile is seen.
-        let record = Record::look(folder);
+        let record = FileLook::of(&folder.join(RECORD));
         let contents = Contents::read(folder)?;
         Ok(Self { record, contents, ground: Ground::default(), globes: Globes::new(assumed) })
     }
 
     /// Whether the database is still that of this build.
     fn is_current(&self) -> bool {
-        self.record.is_some() && self.record == Record::look(&self.contents.folder)
+        self.record.is_some() && self.record == FileLook::of(&self.contents.folder.join(RECORD))
     }
 }
 

@@ -21,7 +21,7 @@ fn hills(ripples_m: f64) -> impl Fn(f64, f64) -> f64 {
 fn build(scene: &Scene, folder: &str, raster: &Raster, datum: &str) {
     raster.write(&scene.path("dem.tif"));
     let job = fs::read_to_string(scene.path("job.toml")).unwrap();
-    let said = format!("voids = \"fail\"\nvertical_datum = \"{datum}\"");
+    let said = format!("voids = \"hole\"\nvertical_datum = \"{datum}\"");
     fs::write(scene.path(&format!("{folder}.toml")), job.replace("voids = \"fail\"", &said)).unwrap();
     scene.run_to(0, &["build", &format!("{folder}.toml"), "--out", folder, "--quiet", "--no-html"]);
 }
@@ -152,4 +152,41 @@ fn what_cannot_be_compared_is_refused_in_a_sentence() {
         assert!(said.stderr.contains(wrong[0]), "{}", said.stderr);
     }
     assert!(!Path::new(&scene.path("certificate.html")).exists());
+}
+
+#[test]
+fn over_a_hole_of_one_nothing_agrees_and_over_a_hole_of_both_it_is_drawn_again() {
+    let scene = with_hills();
+    // No ground in the northern half.
+    let holed = |east: f64, north: f64| if north < 3_876_000.0 { hills(1.0)(east, north) } else { f64::NAN };
+    let raster = Raster::around(holed);
+    raster.write(&scene.path("holed.tif"));
+    let one = found(&scene, 1, &["holed.tif", "--within", "5", "--samples", "300"]);
+    let missing = one["places"]["ground_in_a_only"].as_u64().unwrap();
+    assert!((100..200).contains(&missing), "{one:#}");
+    for name in ["slopes", "sight 1 m", "sight 2.5 m", "sight 10 m"] {
+        let criterion = criterion(&one, name);
+        assert_eq!(criterion["accepted"], Value::from(false), "{criterion}");
+        assert!(missing * 9 / 10 <= criterion["failures"].as_u64().unwrap(), "{name}: {criterion}");
+    }
+    assert!(one["places"]["pairs_over_ground_of_a_only"].as_u64().unwrap() >= missing, "{one:#}");
+    let causes = one["causes"].to_string();
+    assert!(causes.contains("or go over a hole of one surface, for") && causes.contains("or one is missing, at"));
+    // Its own raster lacks the same ground.
+    build(&scene, "holed.tdb", &raster, "EGM96");
+    let words = ["correlate", "holed.tdb", "holed.tif", "--within", "5", "--accept", "0.9", "--format", "json"];
+    let both: Value = serde_json::from_str(&scene.run_to(0, &words).stdout).unwrap();
+    assert!(100 < both["places"]["void_in_both"].as_u64().unwrap(), "{both:#}");
+    assert!(100 < both["places"]["pairs_left_out"].as_u64().unwrap(), "{both:#}");
+}
+
+#[test]
+fn heights_in_feet_are_named() {
+    let scene = with_hills();
+    Raster::around(|east, north| hills(1.0)(east, north) / 0.3048).write(&scene.path("feet.tif"));
+    let found = found(&scene, 1, &["feet.tif"]);
+    let cause = found["causes"][0].as_str().unwrap();
+    assert!(cause.starts_with("heights of B look like feet, those of A like metres: with B times 0.3048"), "{cause}");
+    assert_eq!(found["feet"]["in"], Value::from("b"));
+    assert!(!found["causes"].to_string().contains("vertical datum"), "{found:#}");
 }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::PathBuf;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::remote::{FileServer, Manner, roads_parquet, tiled_raster};
@@ -130,6 +130,30 @@ fn a_fetch_that_was_killed_goes_on_where_it_was() {
     scene.run_to(0, &["fetch", "a.toml", "--quiet"]);
     assert!(of_new < server.requests(), "{of_new} requests after a cut, {} anew", server.requests());
     scene.run_to(0, &["build", "a.toml", "--quiet"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_fetch_that_waits_for_a_silent_server() {
+    let (server, scene) = scene();
+    for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
+        server.behave(Manner::Silent);
+        let waiting = scene.program().args(["fetch", "a.toml"]).stderr(Stdio::piped()).spawn().unwrap();
+        let start = Instant::now();
+        while server.requests() == 0 && start.elapsed() < Duration::from_secs(30) {
+            std::thread::yield_now();
+        }
+        // A person is told that nothing comes.
+        std::thread::sleep(Duration::from_secs(7));
+        let sent = Instant::now();
+        Command::new("kill").args([signal, &waiting.id().to_string()]).status().unwrap();
+        let said = waiting.wait_with_output().unwrap();
+        assert!(sent.elapsed() < Duration::from_secs(5), "{:?}", sent.elapsed());
+        let told = String::from_utf8(said.stderr).unwrap();
+        assert_eq!(said.status.code(), Some(code), "{told}");
+        assert!(told.contains("waits for 127.0.0.1:") && told.contains("stopped"), "{told}");
+        assert!(told.contains("what has come is kept") && !told.contains("secret"), "{told}");
+    }
 }
 
 #[test]

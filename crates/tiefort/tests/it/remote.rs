@@ -65,6 +65,8 @@ pub enum Manner {
     Total(u64),
     /// Gives 403 from this request on.
     CutAfter(usize),
+    /// Sends half of an answer, and then nothing more.
+    Silent,
     /// Gives 403 to requests without this access key.
     Closed(String),
 }
@@ -200,12 +202,15 @@ impl Shared {
             Manner::Endless => body.extend(vec![0; 1 << 16]),
             _ => head += &format!("Content-Length: {}\r\n", body.len()),
         }
-        if manner == Manner::Truncated {
+        if manner == Manner::Truncated || manner == Manner::Silent {
             body.truncate(body.len() / 2);
         }
         self.sent.fetch_add(body.len() as u64, Ordering::SeqCst);
         stream.write_all(format!("HTTP/1.1 {status}\r\n{head}\r\n").as_bytes())?;
         stream.write_all(&body)?;
+        if manner == Manner::Silent {
+            thread::sleep(std::time::Duration::from_secs(600));
+        }
         // What a client does not read must not make the system take back what it has not read yet.
         let _ = stream.shutdown(std::net::Shutdown::Write);
         let _ = stream.take(1).read(&mut [0]);

@@ -470,6 +470,42 @@ fn a_request_that_is_too_long_is_refused() {
 }
 
 #[test]
+fn a_file_that_is_damaged_or_of_another_build_is_not_handed_out() {
+    let server = served();
+    let (path, other) = ("/modules/r00c00.slm", "/modules/r00c01.slm");
+    let on_disk = server.scene.path("small.tdb/modules/r00c00.slm");
+    let sound = fs::read(&on_disk).unwrap();
+    let tag = server.get(path).header("etag").to_owned();
+    let heights = r#"{"positions": [[505010, 3875010]]}"#;
+    let mut damaged = sound.clone();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    // Sound, but of another build.
+    let job = fs::read_to_string(server.scene.path("job.toml")).unwrap();
+    let job = job.replace("mean_per_load_module = 32", "mean_per_load_module = 20");
+    fs::write(server.scene.path("other.toml"), job).unwrap();
+    server.scene.run_to(0, &["build", "other.toml", "--out", "other.tdb", "--quiet", "--no-html"]);
+    let of_another_build = fs::read(server.scene.path("other.tdb/modules/r00c00.slm")).unwrap();
+    for (bytes, part) in [(damaged, ""), (of_another_build, "not of the build"), (sound[..100].to_vec(), "")] {
+        fs::write(&on_disk, &bytes).unwrap();
+        for answer in [
+            server.get(path),
+            server.ask("GET", path, &["Range: bytes=0-9"], &[]),
+            server.get("/modules/r0000c0000.slm"),
+            server.post("/heights", heights),
+        ] {
+            answer.check_refusal(503, &["r00c00.slm", part]);
+        }
+        // What a client has already is what the build left.
+        assert_eq!(server.ask("GET", path, &[&format!("If-None-Match: {tag}")], &[]).status, 304);
+        assert_eq!(server.get(other).status, 200);
+    }
+    fs::write(&on_disk, &sound).unwrap();
+    assert_eq!((server.get(path).status, server.get(path).body), (200, sound));
+    assert_eq!(server.post("/heights", heights).status, 200);
+}
+
+#[test]
 fn a_database_that_is_built_again_is_opened_again_and_nothing_is_mixed() {
     let server = served();
     let before = server.get("/").text();
