@@ -59,6 +59,7 @@ mod openflight;
 pub use openflight::write_openflight;
 mod coarse;
 mod globe;
+mod skirts;
 mod tiles3d;
 mod triangle_index;
 pub use tiles3d::{Tileset, write_3dtiles};

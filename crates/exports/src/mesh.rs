@@ -72,21 +72,37 @@ impl Part {
             let (_, ranges) = pieces.entry((thing.kind, thing.id)).or_insert_with(|| (*thing, Vec::new()));
             ranges.push(range.clone());
         }
-        let part = |ranges: Vec<Range<usize>>| {
-            let (mut part, mut place_of) = (Self::default(), HashMap::new());
-            for index in ranges.into_iter().flatten() {
-                let placed = self.triangles[index].map(|v| {
-                    *place_of.entry(v).or_insert_with(|| {
-                        part.vertices.push(self.vertices[v as usize]);
-                        part.vertices.len() as u32 - 1
-                    })
-                });
-                part.triangles.push(placed);
-                part.classes.push(self.classes[index]);
-            }
-            part
-        };
+        let part = |ranges: Vec<Range<usize>>| self.of_triangles(ranges.into_iter().flatten());
         pieces.into_values().map(|(thing, ranges)| (thing, part(ranges))).collect()
+    }
+
+    /// The same with some of its objects alone.
+    pub(crate) fn of_things(&self, is_wanted: impl Fn(&Thing) -> bool) -> Self {
+        let wanted = || self.things.iter().filter(|(thing, _)| is_wanted(thing));
+        let mut part = self.of_triangles(wanted().flat_map(|(_, range)| range.clone()));
+        let mut end = 0;
+        part.things.extend(wanted().map(|(thing, range)| {
+            let start = end;
+            end += range.len();
+            (*thing, start..end)
+        }));
+        part
+    }
+
+    /// Some of its triangles, over vertices of their own.
+    fn of_triangles(&self, indices: impl Iterator<Item = usize>) -> Self {
+        let (mut part, mut place_of) = (Self::default(), HashMap::new());
+        for index in indices {
+            let placed = self.triangles[index].map(|v| {
+                *place_of.entry(v).or_insert_with(|| {
+                    part.vertices.push(self.vertices[v as usize]);
+                    part.vertices.len() as u32 - 1
+                })
+            });
+            part.triangles.push(placed);
+            part.classes.push(self.classes[index]);
+        }
+        part
     }
 }
 

@@ -85,6 +85,23 @@ pub(crate) fn with_levels() -> Product {
     product
 }
 
+/// The same on both sides of the line between two squares of 4 km, with a pit on it that the coarser level lacks.
+pub(crate) fn across_squares() -> Product {
+    let mut product = with_levels();
+    let pit = |x| ModuleVertex { y: 32_000, x, z: 125_000 };
+    let [west, east] = product.modules.as_mut_slice() else { unreachable!("a sample has two load modules") };
+    west.vertices.insert(2, pit(64_000));
+    (west.triangles, west.classes) = (vec![[0, 1, 2], [0, 2, 4], [0, 4, 3]], vec![0, 1, 1]);
+    east.vertices.insert(3, pit(0));
+    (east.triangles, east.classes) = (vec![[0, 1, 2], [0, 2, 3], [1, 5, 2], [2, 4, 3], [2, 5, 4]], vec![1, 0, 0, 0, 1]);
+    product.modules.iter_mut().for_each(|module| module.polygon_count = module.triangles.len() as u32);
+    product.modules.iter().for_each(|module| assert_eq!(module.check(), Ok(())));
+    product.modules.iter_mut().chain(product.coarser.iter_mut().flatten()).for_each(|module| module.id.col += 7);
+    product.rect = ModuleRect { south: 0, west: 7, north: 1, east: 9 };
+    product.grid.cols = 9;
+    product
+}
+
 /// The same with a hole over the eastern half of the eastern load module.
 pub(crate) fn with_hole() -> Product {
     let mut product = product();

@@ -6,15 +6,18 @@ use std::sync::Arc;
 use rusqlite::Connection;
 use serde_json::Value;
 use terrain::{Draped, ModuleRect};
+use tiff::encoder::TiffEncoder;
+use tiff::encoder::colortype::Gray8;
+use tiff::tags::Tag;
 
 use crate::samples::{self, files, with_work};
 use crate::{ByteRaster, Coordinates, Mesh, Product, TextureFile, Textures};
 
 /// A mesh of a binary glTF: its name and material, and its triangles with y up.
-struct Found {
-    node: String,
-    material: String,
-    triangles: Vec<[[f64; 3]; 3]>,
+pub(crate) struct Found {
+    pub node: String,
+    pub material: String,
+    pub triangles: Vec<[[f64; 3]; 3]>,
 }
 
 /// The document of a binary glTF, and its numbers.
@@ -54,7 +57,8 @@ fn accessor(document: &Value, binary: &[u8], index: &Value) -> Vec<Vec<f64>> {
     (0..number(&accessor["count"])).map(vector).collect()
 }
 
-fn meshes(bytes: &[u8]) -> Vec<Found> {
+/// The meshes of a binary glTF.
+pub(crate) fn meshes(bytes: &[u8]) -> Vec<Found> {
     let (document, binary) = document(bytes);
     let mut found = Vec::new();
     for node in document["nodes"].as_array().unwrap().iter().filter(|node| node.get("mesh").is_some()) {
@@ -270,6 +274,19 @@ fn checkerboard(path: &Path) {
     crate::write_byte_raster(&mut file, &raster, |first, last| (first..=last).flat_map(row).collect()).unwrap();
 }
 
+/// A grey orthophoto from the north-western corner of the sample on, in strips.
+fn photo(path: &Path, [cols, rows]: [u32; 2], (pixel_m, rows_per_strip): (f64, u32), data: &[u8]) {
+    let mut encoder = TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
+    let mut image = encoder.new_image::<Gray8>(cols, rows).unwrap();
+    image.rows_per_strip(rows_per_strip).unwrap();
+    let tags = image.encoder();
+    tags.write_tag(Tag::ModelPixelScaleTag, &[pixel_m, pixel_m, 0.0][..]).unwrap();
+    tags.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, 505_000.0, 3_875_500.0, 0.0][..]).unwrap();
+    let keys: [u16; 16] = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 32611];
+    tags.write_tag(Tag::GeoKeyDirectoryTag, &keys[..]).unwrap();
+    image.write_data(data).unwrap();
+}
+
 /// Brightness and sides of a picture.
 fn decoded(jpeg: &[u8]) -> (Vec<u8>, usize, usize) {
     let mut decoder = zune_jpeg::JpegDecoder::new(std::io::Cursor::new(jpeg));
@@ -347,6 +364,36 @@ fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
     assert_eq!(document["images"][0]["mimeType"], "image/jpeg");
     let same = files(|put, work| crate::write_3dtiles(&product, None, put, work));
     assert!(tiles == same);
+}
+
+#[test]
+fn every_texel_is_that_of_the_photo_however_its_file_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("noise.tif");
+    // Its pixels are as large as texels, and these have their middles on the corners between four of them.
+    let (pixel_m, cols, rows) = (0.3125, 3200_u32, 1600_u32);
+    let grey = |col: u32, row: u32| -> u32 {
+        let at = (row.min(rows - 1) * cols + col.min(cols - 1)).wrapping_mul(0x9e37_79b1);
+        (at ^ at >> 15).wrapping_mul(0x85eb_ca6b) >> 24
+    };
+    let data: Vec<u8> = (0..cols * rows).map(|at| grey(at % cols, at / cols) as u8).collect();
+    let ends = [[505_000.0, 3_875_000.0], [506_000.0, 3_875_500.0]];
+    for rows_per_strip in [1, 64, rows] {
+        photo(&path, [cols, rows], (pixel_m, rows_per_strip), &data);
+        let file = (TextureFile::Rgb, 4096);
+        let product = samples::product();
+        let textures = Textures::open(std::slice::from_ref(&path), product.crs(), ends, None, file).unwrap();
+        let product = Product { textures: Some(Arc::new(textures)), ..product };
+        let bytes = product.texture(product.rect, 0.0).unwrap().unwrap().bytes;
+        let (wide, high) = (cols as usize + 1, rows as usize + 1);
+        assert_eq!(bytes.len(), 512 + 3 * wide * high);
+        for (row, col) in (1..rows).flat_map(|row| (1..cols).map(move |col| (row, col))) {
+            let sum = grey(col - 1, row - 1) + grey(col, row - 1) + grey(col - 1, row) + grey(col, row);
+            let texel = u32::from(bytes[512 + (high - 1 - row as usize) * wide + col as usize]);
+            assert!((4 * texel).abs_diff(sum) <= 2, "{rows_per_strip}: {texel} at {col},{row}, expected {sum} / 4");
+        }
+        assert_eq!(product.textures.as_ref().unwrap().coarser_m(), None);
+    }
 }
 
 #[test]

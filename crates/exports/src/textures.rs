@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::ExportError;
-use source_files::{Crs, Imagery, Keep, SourceError, Square};
+use source_files::{Care, Crs, Imagery, Keep, SourceError, Square};
 
 /// Bytes of decoded strips and tiles that are kept: a row of tiles of 512 pixels across 49,000 of them.
 const KEPT_BYTES_MAX: usize = 96 << 20;
@@ -154,7 +154,7 @@ impl Textures {
         let square = Square { crs: &self.crs, corner, pixel_m: texel_m, side };
         let mut pixels = vec![0; 4 * side * side];
         for picture in &self.pictures {
-            picture.draw(&square, &self.keep, &mut pixels).map_err(of_source)?;
+            picture.draw_with(Care::Whole, &square, &self.keep, &mut pixels).map_err(of_source)?;
         }
         let opaque = |pixel: &[u8; 4]| {
             // Colours come multiplied with how opaque they are; the ground shows where none is.

@@ -2,27 +2,32 @@
 //! glTF. A group is halved until it has no more triangles than a viewer likes to load at once. Triangles over holes are
 //! left out, and in the coarse mesh load modules that are holes for more than half.
 //!
-//! Where load modules have coarser levels, those of a square are a mesh between the two, level by level. Decks and
-//! objects are nodes of their own in the files of groups and levels; the coarse mesh of a square has none, and one
-//! class. Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A
-//! geometric error is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the
-//! largest residual.
+//! Where load modules have coarser levels, those of a square are a mesh between the two, level by level. Decks, ribbons
+//! and objects are nodes of their own in the files of groups and levels; a level lacks objects that are no higher than
+//! its error, and ribbons that are no wider; the coarse mesh of a square has none of them, and one class. From sides
+//! that squares share hang skirts, as neighbours may be shown at other levels.
+//!
+//! Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A geometric error
+//! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
+//! residual.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
-use terrain::{ModuleRect, metres_of_quanta};
+use terrain::{ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::coarse::Coarse;
-use crate::detail::{largest_residual_m, steps};
-use crate::earth::Earth;
+use crate::detail::{Step, largest_residual_m, steps};
+use crate::earth::{Earth, earth_centred};
 use crate::glb::{Gltf, GltfNode, turned};
 use crate::glb_features::FoundFeatures;
 use crate::globe::{Globe, LocalFrame};
 use crate::mesh::{Mesh, Part};
 use crate::modules::{group_name, sheet_name};
 use crate::openflight::{square_name, square_side};
+use crate::product::is_band;
+use crate::skirts::{Depths, Side, Skirt, depths};
 use crate::{Datum, ExportError, Product, Put, Sheet, Texture, Work};
 
 /// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
@@ -140,16 +145,18 @@ impl Layers {
         Ok(Self { layers, earth })
     }
 
-    /// The text of `tileset.json`; `square` gives the tile of a square.
+    /// The text of `tileset.json`; `square` gives the tile of a square, and how far its skirts hang, in metres.
     fn tileset(
         &self,
         work: &Work,
-        square: impl Fn(ModuleRect) -> Result<Option<Value>, ExportError> + Sync,
+        square: impl Fn(ModuleRect) -> Result<Option<(Value, f64)>, ExportError> + Sync,
     ) -> Result<String, ExportError> {
         let product = &self.layers[0].product;
         let squares = product.squares(square_side(product));
-        let children: Vec<Value> =
+        let found: Vec<(Value, f64)> =
             work.each("squares", &squares, |&rect| square(rect))?.into_iter().flatten().collect();
+        let deepest_m = found.iter().map(|(_, deepest_m)| *deepest_m).fold(0.0, f64::max);
+        let children = found.into_iter().map(|(tile, _)| tile).collect();
         let heights = || self.layers.iter().flat_map(|layer| layer.globe.height_m.iter().copied());
         let (low, high) = (heights().fold(f64::INFINITY, f64::min), heights().fold(f64::NEG_INFINITY, f64::max));
         // Neither the tileset nor its root has anything to draw, so without their tiles all of the area is missing,
@@ -167,7 +174,7 @@ impl Layers {
             },
             "geometricError": missing_m,
             "root": {
-                "boundingVolume": { "region": region(&self.layers[0].globe.lon_lat, low, high) },
+                "boundingVolume": { "region": region(&self.layers[0].globe.lon_lat, low - deepest_m, high) },
                 "geometricError": missing_m,
                 "refine": "REPLACE",
             },
@@ -176,25 +183,26 @@ impl Layers {
         Ok(tileset.to_string())
     }
 
-    /// Hands out the files of a square; its tile, if it has any ground.
-    fn square(&self, rect: ModuleRect, take: &Take) -> Result<Option<Value>, ExportError> {
+    /// Hands out the files of a square; its tile, if it has any ground, and how far its skirts hang, in metres.
+    fn square(&self, rect: ModuleRect, take: &Take) -> Result<Option<(Value, f64)>, ExportError> {
         let finest = &self.layers[0];
         let coarse = Coarse::of(&finest.product, &finest.mesh, rect);
         let middle = coarse.vertices[coarse.vertices.len() / 2] as usize;
         let frame = LocalFrame::at(finest.globe.lon_lat[middle], finest.globe.height_m[middle]);
-        let parts: Vec<Parts> = self.layers.iter().map(|layer| layer.mesh.parts(&layer.product, rect)).collect();
-        if parts.iter().all(Vec::is_empty) {
+        let steps = steps(self.layers.iter().map(|layer| &layer.product), rect);
+        let (shown, skirt) = self.shown(rect, &coarse, &steps);
+        if shown.iter().all(|shown| shown.parts.is_empty()) {
             return Ok(None);
         }
-        let bounds = box_around(self.layers.iter().zip(&parts).flat_map(|(layer, parts)| layer.places(&frame, parts)));
-        let mut children = finest.groups(&frame, rect, take)?;
+        let places = self.layers.iter().zip(&shown).flat_map(|(layer, shown)| layer.places(&frame, shown));
+        let bounds = box_around(places.chain(finest.below(&frame, &coarse.vertices, &skirt)));
+        let mut children = finest.groups(&frame, rect, &shown[0].depths, take)?;
         // A viewer would not go on to what is finer if what is coarser were said to be truer.
-        let steps = steps(self.layers.iter().map(|layer| &layer.product), rect);
-        for ((layer, parts), step) in self.layers.iter().zip(&parts).zip(&steps).skip(1) {
+        for ((layer, shown), step) in self.layers.iter().zip(&shown).zip(&steps).skip(1) {
             let name = square_name(&layer.product, rect, "glb");
             let uri = format!("levels/{}/{name}", step.level);
             let texture = layer.product.texture(rect, step.error_m)?;
-            take(&uri, &|| layer.gltf(&frame, rect, parts, texture.clone()).bytes())?;
+            take(&uri, &|| layer.gltf(&frame, rect, shown, texture.clone()).bytes())?;
             let mut level = json!({
                 "boundingVolume": { "box": bounds },
                 "geometricError": step.error_m,
@@ -204,7 +212,7 @@ impl Layers {
             children = vec![level];
         }
         // The coarse mesh lacks what stands on the ground.
-        let coarse_error_m = coarse.error_m.max(metres_of_quanta(Mesh::tallest(&parts[0])));
+        let coarse_error_m = coarse.error_m.max(metres_of_quanta(Mesh::tallest(&shown[0].parts)));
         let mut tile = json!({
             "transform": frame.matrix(),
             "boundingVolume": { "box": bounds },
@@ -219,13 +227,35 @@ impl Layers {
             let texture = finest.product.texture(rect, coarse.error_m)?;
             take(&uri, &|| {
                 let classes = vec![0; coarse.triangles.len()];
-                let node = finest.node(&frame, group_name(rect), &coarse.vertices, texture.as_ref());
-                let nodes = vec![node.with_groups(&coarse.triangles, &classes)];
+                let node = finest.node(&frame, group_name(rect), (&coarse.vertices, &skirt), texture.as_ref());
+                let nodes = vec![with_skirt(node, &coarse.triangles, &classes, &skirt)];
                 Gltf { sheets: vec![(Sheet::Ground, nodes)], texture: texture.clone(), ..Gltf::default() }.bytes()
             })?;
             tile["content"] = json!({ "uri": uri });
         }
-        Ok(Some(tile))
+        let skirts = shown.iter().map(|shown| &shown.skirt).chain([&skirt]);
+        Ok(Some((tile, skirts.map(Skirt::deepest_m).fold(0.0, f64::max))))
+    }
+
+    /// What is shown of a square at each level, and the skirt of its coarse mesh.
+    fn shown(&self, rect: ModuleRect, coarse: &Coarse, steps: &[Step]) -> (Vec<Shown>, Skirt) {
+        let finest = &self.layers[0];
+        let parts: Vec<Parts> = self.layers.iter().zip(steps).map(|(layer, step)| layer.parts(rect, step)).collect();
+        let ground =
+            |parts: &Parts| parts.iter().find(|(sheet, _)| *sheet == Sheet::Ground).map(|(_, part)| part.clone());
+        let of_parts = self.layers.iter().zip(&parts).map(|(layer, parts)| {
+            let vertices = ground(parts).unwrap_or_default().vertices;
+            vertices.iter().map(|&v| layer.mesh.vertices[v as usize]).collect()
+        });
+        let of_coarse = coarse.triangles.as_flattened().iter().map(|&v| coarse.vertices[v as usize]);
+        let of_coarse = of_coarse.map(|v| finest.mesh.vertices[v as usize]).collect();
+        let meshes: Vec<Vec<[i32; 3]>> = of_parts.chain([of_coarse]).collect();
+        let mut depths = depths(&Side::within(&finest.product, rect), &meshes);
+        let last = depths.pop().expect("the coarse mesh is the last");
+        let classes = vec![0; coarse.triangles.len()];
+        let skirt = Skirt::of(&finest.mesh, &coarse.vertices, &coarse.triangles, &classes, &last);
+        let layers = self.layers.iter().zip(parts).zip(depths);
+        (layers.map(|((layer, parts), depths)| Shown::of(layer, parts, depths)).collect(), skirt)
     }
 }
 
@@ -246,23 +276,85 @@ fn halves(rect: ModuleRect) -> [ModuleRect; 2] {
 /// What some load modules have of each sheet.
 type Parts = Vec<(Sheet, Part)>;
 
+/// What a file shows of some load modules.
+struct Shown {
+    parts: Parts,
+    /// How far the skirt of their ground hangs.
+    depths: Depths,
+    skirt: Skirt,
+}
+
+impl Shown {
+    fn of(layer: &Layer, parts: Parts, depths: Depths) -> Self {
+        let skirt = match parts.first() {
+            Some((Sheet::Ground, ground)) => {
+                Skirt::of(&layer.mesh, &ground.vertices, &ground.triangles, &ground.classes, &depths)
+            }
+            _ => Skirt::default(),
+        };
+        Self { parts, depths, skirt }
+    }
+
+    /// The skirt of a sheet.
+    fn skirt_of(&self, sheet: Sheet) -> &Skirt {
+        const NONE: &Skirt = &Skirt { hung: Vec::new(), triangles: Vec::new(), classes: Vec::new() };
+        if sheet == Sheet::Ground { &self.skirt } else { NONE }
+    }
+}
+
+/// A node with its triangles, and those of its skirt.
+fn with_skirt(node: GltfNode, triangles: &[[u32; 3]], classes: &[u8], skirt: &Skirt) -> GltfNode {
+    node.with_groups(&[triangles, &skirt.triangles].concat(), &[classes, &skirt.classes].concat())
+}
+
 impl Layer {
+    /// The sheets of a rectangle; of a coarser level without objects and ribbons whose height and width are no larger
+    /// than its error.
+    fn parts(&self, rect: ModuleRect, step: &Step) -> Parts {
+        let mut parts = self.mesh.parts(&self.product, rect);
+        let is_finest = step.near_m == 0.0;
+        if is_finest {
+            return parts;
+        }
+        let least = step.error_m * f64::from(QUANTA_PER_METRE);
+        let bands = self.product.lines.iter().flatten().filter(|line| is_band(line));
+        let widest = bands.map(|line| line.traits.width).max().unwrap_or(0);
+        for (sheet, part) in &mut parts {
+            match sheet {
+                Sheet::Objects => *part = part.of_things(|thing| least < f64::from(thing.height)),
+                Sheet::Ribbons if f64::from(widest) <= least => *part = Part::default(),
+                _ => {}
+            }
+        }
+        parts.retain(|(_, part)| !part.triangles.is_empty());
+        parts
+    }
+
     /// The sheets of a rectangle, each a node where there is any.
-    fn gltf(&self, frame: &LocalFrame, rect: ModuleRect, parts: &Parts, texture: Option<Texture>) -> Gltf<'_> {
+    fn gltf(&self, frame: &LocalFrame, rect: ModuleRect, shown: &Shown, texture: Option<Texture>) -> Gltf<'_> {
         let node = |(sheet, part): &(Sheet, Part)| {
             let features = (*sheet == Sheet::Objects).then(|| FoundFeatures::of(part));
             let texture = texture.as_ref().filter(|_| *sheet != Sheet::Objects);
-            let node = self.node(frame, sheet_name(*sheet, rect), &part.vertices, texture);
-            let node = GltfNode { features, lanes: part.lanes.clone(), ..node };
-            (*sheet, vec![node.with_groups(&part.triangles, &part.classes)])
+            let skirt = shown.skirt_of(*sheet);
+            let node = self.node(frame, sheet_name(*sheet, rect), (&part.vertices, skirt), texture);
+            let mut lanes = part.lanes.clone();
+            lanes.extend(skirt.hung.iter().filter_map(|(v, _)| part.lanes.get(*v as usize)));
+            let node = GltfNode { features, lanes, ..node };
+            (*sheet, vec![with_skirt(node, &part.triangles, &part.classes, skirt)])
         };
-        let sheets = parts.iter().map(node).collect();
+        let sheets = shown.parts.iter().map(node).collect();
         let thanks = self.product.attributions().join("; ");
         Gltf { sheets, classes: self.product.classes(), thanks, texture, ..Gltf::default() }
     }
 
-    /// Hands out a file for each group of load modules of a square; their tiles.
-    fn groups(&self, frame: &LocalFrame, square: ModuleRect, take: &Take) -> Result<Vec<Value>, ExportError> {
+    /// Hands out a file for each group of load modules of a square, whose skirts hang so far; their tiles.
+    fn groups(
+        &self,
+        frame: &LocalFrame,
+        square: ModuleRect,
+        depths: &Depths,
+        take: &Take,
+    ) -> Result<Vec<Value>, ExportError> {
         let mut tiles = Vec::new();
         let mut left = vec![square];
         while let Some(rect) = left.pop() {
@@ -277,9 +369,10 @@ impl Layer {
             }
             let uri = format!("groups/{}.glb", group_name(rect));
             let texture = self.product.texture(rect, 0.0)?;
-            take(&uri, &|| self.gltf(frame, rect, &parts, texture.clone()).bytes())?;
+            let shown = Shown::of(self, parts, depths.clone());
+            take(&uri, &|| self.gltf(frame, rect, &shown, texture.clone()).bytes())?;
             tiles.push(json!({
-                "boundingVolume": { "box": box_around(self.places(frame, &parts)) },
+                "boundingVolume": { "box": box_around(self.places(frame, &shown)) },
                 "geometricError": largest_residual_m(&self.product, rect),
                 "content": { "uri": uri },
             }));
@@ -287,21 +380,45 @@ impl Layer {
         Ok(tiles)
     }
 
-    /// Where the vertices of all sheets lie in a frame.
-    fn places(&self, frame: &LocalFrame, parts: &Parts) -> impl Iterator<Item = [f64; 3]> {
-        let vertices = parts.iter().flat_map(|(_, part)| &part.vertices);
-        vertices.map(|&v| frame.local(self.globe.place[v as usize]))
+    /// Where the vertices of all that is shown lie in a frame.
+    fn places<'a>(&'a self, frame: &'a LocalFrame, shown: &'a Shown) -> impl Iterator<Item = [f64; 3]> + 'a {
+        let vertices = shown.parts.iter().flat_map(|(_, part)| &part.vertices);
+        let ground = shown.parts.first().map_or(&[][..], |(_, part)| &part.vertices);
+        vertices.map(|&v| frame.local(self.globe.place[v as usize])).chain(self.below(frame, ground, &shown.skirt))
     }
 
-    /// Vertices of the mesh in a frame.
-    fn node(&self, frame: &LocalFrame, name: String, vertices: &[u32], texture: Option<&Texture>) -> GltfNode {
+    /// Where the lower corners of the skirt of vertices of the mesh lie in a frame.
+    fn below<'a>(
+        &'a self,
+        frame: &'a LocalFrame,
+        vertices: &'a [u32],
+        skirt: &'a Skirt,
+    ) -> impl Iterator<Item = [f64; 3]> + 'a {
+        skirt.hung.iter().map(move |&(v, depth_m)| {
+            let v = vertices[v as usize] as usize;
+            frame.local(earth_centred(self.globe.lon_lat[v], self.globe.height_m[v] - depth_m))
+        })
+    }
+
+    /// Vertices of the mesh in a frame, and those of their skirt, which look as those above them.
+    fn node(
+        &self,
+        frame: &LocalFrame,
+        name: String,
+        (vertices, skirt): (&[u32], &Skirt),
+        texture: Option<&Texture>,
+    ) -> GltfNode {
         let place = |&v: &u32| turned(frame.local(self.globe.place[v as usize]));
         let normal = |&v: &u32| turned(frame.turned(self.globe.normal[v as usize]));
+        let below = self.below(frame, vertices, skirt).map(turned);
+        let positions = vertices.iter().map(place).chain(below).collect();
+        let above = skirt.hung.iter().map(|&(v, _)| vertices[v as usize]);
+        let like: Vec<u32> = vertices.iter().copied().chain(above).collect();
         GltfNode {
             name,
-            positions: vertices.iter().map(place).collect(),
-            normals: vertices.iter().map(normal).collect(),
-            uvs: texture.map(|texture| self.mesh.uvs(texture, vertices)).unwrap_or_default(),
+            positions,
+            normals: like.iter().map(normal).collect(),
+            uvs: texture.map(|texture| self.mesh.uvs(texture, &like)).unwrap_or_default(),
             ..GltfNode::default()
         }
     }
@@ -438,5 +555,144 @@ mod tests {
         for (name, bytes) in plain.iter().filter(|(name, _)| name.as_str() != "tileset.json") {
             assert!(files[name] == *bytes, "{name}");
         }
+    }
+
+    /// A tile with its file, its box and the matrix of its square.
+    struct Seen {
+        uri: String,
+        triangles: Vec<[[f64; 3]; 3]>,
+        bounds: Vec<f64>,
+    }
+
+    fn numbers(of: &Value) -> Vec<f64> {
+        of.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+    }
+
+    /// The tiles of a square, their triangles x east, y north, z up in its frame.
+    fn seen(tile: &Value, files: &BTreeMap<String, Vec<u8>>) -> Vec<Seen> {
+        let uri = tile["content"]["uri"].as_str().unwrap().to_owned();
+        let east_north_up = |[x, y, z]: [f64; 3]| [x, -z, y];
+        let of_mesh = |mesh: crate::tests::Found| mesh.triangles.into_iter().map(|corners| corners.map(east_north_up));
+        let triangles = crate::tests::meshes(&files[&uri]).into_iter().flat_map(of_mesh).collect();
+        let own = Seen { uri, triangles, bounds: numbers(&tile["boundingVolume"]["box"]) };
+        let children = tile["children"].as_array().into_iter().flatten();
+        std::iter::once(own).chain(children.flat_map(|child| seen(child, files))).collect()
+    }
+
+    /// The wall of a tile on the side of its square: its triangles that stand upright.
+    fn wall(tile: &Seen) -> Vec<[[f64; 3]; 3]> {
+        let normal = |[a, b, c]: [[f64; 3]; 3]| {
+            crate::mesh::unit(crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a)))
+        };
+        tile.triangles.iter().copied().filter(|corners| normal(*corners)[2].abs() < 0.1).collect()
+    }
+
+    #[test]
+    fn no_gap_is_seen_between_squares_whatever_level_each_is_shown_at() {
+        let product = samples::across_squares();
+        let files = written(&product);
+        let tileset: Value = serde_json::from_slice(&files["tileset.json"]).unwrap();
+        let squares = tileset["root"]["children"].as_array().unwrap();
+        assert_eq!(squares.len(), 2);
+        // The line is 500 m long; the pit in its middle is 3384 quanta deep.
+        let depth_m = (f64::midpoint(128_256.0, 128_512.0) - 125_000.0) / 128.0;
+        for (square, outwards) in squares.iter().zip([1.0, -1.0]) {
+            let tiles = seen(square, &files);
+            assert_eq!(tiles.len(), 3, "the square, a level, a group");
+            for tile in &tiles {
+                let wall = wall(tile);
+                // The group has the lowest ground: its wall closes what the bulge of the Earth opens.
+                let is_finest = tile.uri.starts_with("groups/");
+                assert_eq!(wall.len(), if is_finest { 4 } else { 2 }, "{}", tile.uri);
+                let heights = || wall.iter().flatten().map(|place| place[2]);
+                let height_m = heights().fold(f64::NEG_INFINITY, f64::max) - heights().fold(f64::INFINITY, f64::min);
+                // The line rises by 2 m itself.
+                let expected_m = if is_finest { 2.0 + depth_m - 1.0 } else { depth_m + 2.0 };
+                assert!((height_m - expected_m).abs() < 0.3, "{}: {height_m} {expected_m}", tile.uri);
+                for corners in &wall {
+                    let [a, b, c] = *corners;
+                    let normal = crate::mesh::cross(crate::mesh::minus(b, a), crate::mesh::minus(c, a));
+                    assert!(0.0 < normal[0] * outwards, "{} faces the other square", tile.uri);
+                }
+                let [x, y, z] = [0, 1, 2].map(|axis| tile.bounds[3 + 4 * axis]);
+                let inside = |place: &[f64; 3]| {
+                    [x, y, z]
+                        .iter()
+                        .zip(place)
+                        .zip(&tile.bounds)
+                        .all(|((half, at), mid)| (at - mid).abs() < half + 1e-3)
+                };
+                assert!(tile.triangles.iter().flatten().all(inside), "{}: its box holds its walls", tile.uri);
+            }
+        }
+        let lowest = numbers(&tileset["root"]["boundingVolume"]["region"])[4];
+        let alone = written(&samples::product());
+        let alone: Value = serde_json::from_slice(&alone["tileset.json"]).unwrap();
+        let of_alone = numbers(&alone["root"]["boundingVolume"]["region"])[4];
+        // Without the pit the lowest place is at 127,000 quanta.
+        assert!((of_alone - lowest - 2000.0 / 128.0 - depth_m).abs() < 1.0, "{lowest} {of_alone}");
+    }
+
+    #[test]
+    fn whatever_two_squares_show_the_higher_hangs_below_the_lower() {
+        let product = samples::across_squares();
+        let layers =
+            samples::with_work(|work| Layers::of(&product, Earth::new(&product, None).unwrap(), work)).unwrap();
+        let levels = layers.layers.iter().map(|layer| &layer.product);
+        // Top and bottom of each mesh of a square in the middle of the common side, in quanta.
+        let mut ends = Vec::new();
+        for rect in product.squares(8) {
+            let coarse = Coarse::of(&layers.layers[0].product, &layers.layers[0].mesh, rect);
+            let (shown, skirt) = layers.shown(rect, &coarse, &steps(levels.clone(), rect));
+            let tops = [125_000.0, 128_384.0, 128_384.0];
+            let deepest = shown.iter().map(|shown| &shown.skirt).chain([&skirt]).map(Skirt::deepest_m);
+            ends.push(
+                tops.into_iter().zip(deepest).map(|(top, depth_m)| (top, top - 128.0 * depth_m)).collect::<Vec<_>>(),
+            );
+        }
+        for (top, _) in &ends[0] {
+            for (other, bottom) in &ends[1] {
+                assert!(top >= other || bottom <= top, "{ends:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_coarser_level_has_objects_and_ribbons_that_are_larger_than_its_error() {
+        let mut product = samples::with_objects();
+        product.coarser = vec![product.modules.clone()];
+        let heights = |uri: &str, product: &Product| -> Vec<String> {
+            let files = written(product);
+            let meshes = crate::tests::meshes(&files[uri]);
+            let mut found: Vec<String> = meshes.into_iter().map(|mesh| mesh.material).collect();
+            found.dedup();
+            found.retain(|material| !material.starts_with("class"));
+            found
+        };
+        let (level, group) = ("levels/1/r00c00.glb", "groups/r0000c0000_r0000c0001.glb");
+        let all = heights(group, &product);
+        assert_eq!(heights(level, &product), all, "all are higher than 300 quanta");
+        // The chimney is 7100 quanta high, the wood 1920 and the house 1400.
+        let with_error = |largest: u32| {
+            let mut product = product.clone();
+            product.coarser[0].iter_mut().for_each(|module| module.residual.largest = largest);
+            product
+        };
+        assert_eq!(heights(level, &with_error(1399)), all);
+        assert_eq!(heights(level, &with_error(1400)), ["tower_roof", "tower_wall", "wood_top", "wood_side"]);
+        assert_eq!(heights(level, &with_error(1920)), ["tower_roof", "tower_wall"]);
+        assert!(heights(level, &with_error(7100)).is_empty());
+        assert_eq!(heights(group, &with_error(7100)), all);
+        // A road of 896 quanta and a stream of 256.
+        let mut product = samples::with_ways();
+        product.coarser = vec![product.modules.clone()];
+        let nodes = |largest: u32| {
+            product.coarser[0].iter_mut().for_each(|module| module.residual.largest = largest);
+            crate::tests::meshes(&written(&product)[level])
+                .into_iter()
+                .filter(|mesh| mesh.node.starts_with("ribbons"))
+                .count()
+        };
+        assert_eq!([895, 896].map(nodes), [2, 0]);
     }
 }

@@ -46,7 +46,7 @@ mod mosaic;
 mod warp;
 pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, window_reaching};
 mod edges;
-pub use edges::{EdgeStep, edge_steps};
+pub use edges::{EdgeStep, edge_steps, edge_steps_by_window};
 mod geoid_file;
 mod windows;
 pub use windows::{Look, Windows};
@@ -55,7 +55,7 @@ pub use wide::WideMosaic;
 mod classes;
 pub use classes::ClassRaster;
 mod imagery;
-pub use imagery::{Imagery, Keep, Square};
+pub use imagery::{Care, Imagery, Keep, Square};
 mod geopackage;
 #[cfg(feature = "geoparquet")]
 mod geoparquet;

@@ -2,9 +2,9 @@
 //!
 //! Every sixteenth pixel is projected, and what lies between is interpolated. Of the levels, the coarsest is taken that
 //! is as fine as the square. Where it is still so fine that too many of its strips or tiles lie below the square, as
-//! in a large picture without overviews, one of several stands for all of them.
+//! in a large picture without overviews, one of several stands for all of them if the square is a glimpse.
+//! Pixels are drawn in blocks of 16 x 16, so that few strips and tiles are needed at a time.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::level::{Level, PIXELS_MAX};
@@ -16,8 +16,29 @@ use crate::kept::Kept;
 
 /// Pixels of a square between projected places.
 const STEP: usize = 16;
-/// Places along a side of a pixel that it is the mean of.
-const PLACES_MAX: usize = 4;
+/// A pixel of a square that is so little larger than one of the picture takes the colour at its middle alone.
+const HAIR: f64 = 1.02;
+/// Strips or tiles that a canvas holds along each axis: a colour is the mean of four pixels beside each other.
+const HELD: usize = 2;
+
+/// How much of a picture a square is drawn from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Care {
+    /// At once: few strips or tiles, and few pixels of each.
+    Glimpse,
+    /// From all that lies below it.
+    Whole,
+}
+
+impl Care {
+    /// Places along a side of a pixel that it is the mean of.
+    fn places_max(self) -> usize {
+        match self {
+            Self::Glimpse => 4,
+            Self::Whole => 64,
+        }
+    }
+}
 
 /// A square of ground, its pixels row by row from the north-west.
 #[derive(Clone, Debug)]
@@ -43,31 +64,41 @@ type Place = Option<[f64; 2]>;
 
 impl Imagery {
     /// Draws the picture over what `pixels` hold: four bytes each, red, green and blue multiplied with how opaque they
-    /// are, and that. Returns whether any of it lies there.
+    /// are, and that. Few strips or tiles are read for it. Returns whether any of it lies there.
     ///
     /// # Errors
     /// When the file is gone, or part of it cannot be decoded.
     pub fn draw(&self, square: &Square, keep: &Keep, pixels: &mut [u8]) -> Result<bool, SourceError> {
+        self.draw_with(Care::Glimpse, square, keep, pixels)
+    }
+
+    /// The same with as much care as is asked for.
+    ///
+    /// # Errors
+    /// When the file is gone, or part of it cannot be decoded.
+    pub fn draw_with(&self, care: Care, square: &Square, keep: &Keep, pixels: &mut [u8]) -> Result<bool, SourceError> {
         assert!(pixels.len() == 4 * square.side * square.side, "a square of four bytes a pixel");
         let net = self.net(square);
         let Some((places, ratio)) = reach(&net, square.side) else { return Ok(false) };
-        let mut canvas = Canvas::new(self, keep, ratio, places);
+        let mut canvas = Canvas::new(self, keep, care, (ratio, places));
         if canvas.is_outside(places) {
             return Ok(false);
         }
         let across = square.side / STEP + 1;
         let mut is_any = false;
-        for (at, pixel) in pixels.chunks_exact_mut(4).enumerate() {
-            let (row, col) = (at / square.side, at % square.side);
-            let cell = row / STEP * across + col / STEP;
+        for cell in (0..across * (across - 1)).filter(|cell| cell % across + 1 < across) {
             let corners = [cell, cell + 1, cell + across, cell + across + 1].map(|corner| net[corner]);
             let [Some(a), Some(b), Some(c), Some(d)] = corners else { continue };
-            let sum = canvas.mean([a, b, c, d], [col % STEP, row % STEP])?;
-            let rest = 255.0 - sum[3];
-            if 0.0 < sum[3] {
-                is_any = true;
-                for (part, sum) in pixel.iter_mut().zip(sum) {
-                    *part = (sum + f32::from(*part) * rest / 255.0 + 0.5) as u8;
+            let first = cell / across * STEP * square.side + cell % across * STEP;
+            for (row, col) in (0..STEP).flat_map(|row| (0..STEP).map(move |col| (row, col))) {
+                let sum = canvas.mean([a, b, c, d], [col, row])?;
+                let rest = 255.0 - sum[3];
+                if 0.0 < sum[3] {
+                    is_any = true;
+                    let pixel = &mut pixels[4 * (first + row * square.side + col)..][..4];
+                    for (part, sum) in pixel.iter_mut().zip(sum) {
+                        *part = (sum + f32::from(*part) * rest / 255.0 + 0.5) as u8;
+                    }
                 }
             }
         }
@@ -145,27 +176,44 @@ struct Canvas<'a> {
     is_smooth: bool,
     /// Strips or tiles that one of them stands for, across and down.
     stands_for: [u32; 2],
-    chunks: HashMap<u32, Arc<Colored>>,
-    last: Option<(u32, Arc<Colored>)>,
+    /// By whether their column and row among all strips or tiles are odd.
+    held: [Option<Held>; HELD * HELD],
+    /// Which of these was asked for last.
+    last: usize,
+}
+
+/// A strip or tile, and the pixels that it has the colours of.
+struct Held {
+    chunk: u32,
+    west: u32,
+    north: u32,
+    east: u32,
+    south: u32,
+    colors: Arc<Colored>,
 }
 
 impl<'a> Canvas<'a> {
-    fn new(picture: &'a Imagery, keep: &'a Keep, ratio: f64, ends: [f64; 4]) -> Self {
+    fn new(picture: &'a Imagery, keep: &'a Keep, care: Care, (ratio, ends): (f64, [f64; 4])) -> Self {
         let full = &picture.levels[0];
         let scale = |level: &Level| {
             [f64::from(level.cols) / f64::from(full.cols), f64::from(level.rows) / f64::from(full.rows)]
         };
         // A hair of room, so that a level of just the same size is taken.
-        let is_fine = |level: &&Level| 1.0 <= 1.02 * ratio * scale(level)[0];
+        let is_fine = |level: &&Level| 1.0 <= HAIR * ratio * scale(level)[0];
         let index = picture.levels.iter().take_while(is_fine).count().saturating_sub(1);
         let level = &picture.levels[index];
         let scale = scale(level);
         let own = ratio * scale[0];
-        let places = (own.ceil() as usize).clamp(1, PLACES_MAX);
-        let stands_for =
-            standing(level, [ends[0] * scale[0], ends[1] * scale[1], ends[2] * scale[0], ends[3] * scale[1]]);
-        let is_smooth = own < 2.0 && stands_for == [1, 1];
-        Self { picture, keep, index, scale, places, is_smooth, stands_for, chunks: HashMap::new(), last: None }
+        let places = ((own / HAIR).ceil() as usize).clamp(1, care.places_max());
+        let stands_for = match care {
+            Care::Whole => [1, 1],
+            Care::Glimpse => {
+                let [west, north, east, south] = ends;
+                standing(level, [west * scale[0], north * scale[1], east * scale[0], south * scale[1]])
+            }
+        };
+        let is_smooth = care == Care::Whole || own < 2.0 && stands_for == [1, 1];
+        Self { picture, keep, index, scale, places, is_smooth, stands_for, held: [const { None }; _], last: 0 }
     }
 
     fn level(&self) -> &'a Level {
@@ -226,28 +274,26 @@ impl<'a> Canvas<'a> {
     }
 
     fn pixel(&mut self, col: u32, row: u32) -> Result<[u8; 4], SourceError> {
+        if let Some(held) = &self.held[self.last]
+            && (held.west..held.east).contains(&col)
+            && (held.north..held.south).contains(&row)
+        {
+            return Ok(held.colors.at(col - held.west, row - held.north));
+        }
         let level = self.level();
         let (across, in_col) = shrunk(col, level.chunk_cols, level.chunks_across(), self.stands_for[0]);
         let (down, in_row) = shrunk(row, level.chunk_rows, level.chunks_down(), self.stands_for[1]);
         let chunk = down * level.chunks_across() + across;
-        if self.last.as_ref().is_none_or(|(last, _)| *last != chunk) {
-            let found = match self.chunks.get(&chunk) {
-                Some(found) => found.clone(),
-                None => {
-                    let key = (self.picture.id, self.index, chunk);
-                    let found = self.keep.get(key, || colored(level, chunk))?;
-                    self.chunks.insert(chunk, found.clone());
-                    found
-                }
-            };
-            self.last = Some((chunk, found));
-        }
-        let (_, found) = self.last.as_ref().expect("it was just put there");
+        self.last = down as usize % HELD * HELD + across as usize % HELD;
+        let held = match &mut self.held[self.last] {
+            Some(held) if held.chunk == chunk => held,
+            place => place.insert(self.keep.held((self.picture.id, self.index, chunk), level, self.stands_for)?),
+        };
         // The last ones may be smaller than what they stand for.
         let [west, north] = level.corner_of(chunk);
         let in_col = in_col.min(level.cols - west - 1);
-        let in_row = in_row.min(found.rows - 1).min(level.rows - north - 1);
-        Ok(found.at(in_col, in_row))
+        let in_row = in_row.min(held.colors.rows - 1).min(level.rows - north - 1);
+        Ok(held.colors.at(in_col, in_row))
     }
 }
 
@@ -300,7 +346,17 @@ impl Keep {
         self.0.decoded()
     }
 
-    pub(super) fn get(
+    /// A strip or tile of a level.
+    fn held(&self, key: Key, level: &Level, stands_for: [u32; 2]) -> Result<Held, SourceError> {
+        let (_, _, chunk) = key;
+        let colors = self.get(key, || colored(level, chunk))?;
+        let [west, north] = level.corner_of(chunk);
+        // One that stands for others is looked up pixel by pixel.
+        let [cols, rows] = if stands_for == [1, 1] { [colors.cols, colors.rows] } else { [0, 0] };
+        Ok(Held { chunk, west, north, east: west + cols, south: north + rows, colors })
+    }
+
+    fn get(
         &self,
         key: Key,
         decode: impl FnOnce() -> Result<Colored, SourceError>,

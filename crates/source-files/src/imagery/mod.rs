@@ -7,8 +7,8 @@
 //!   picture       all of them, opened
 //!   draw          a square of ground, from the level that is as fine as it; strips and tiles decoded last
 //! ```
-//! A picture is never read whole: a square takes the strips or tiles below it, and no more than [`level::PIXELS_MAX`]
-//! pixels of them.
+//! A picture is never in memory as a whole: a square takes the strips or tiles below it, one after the other, and if it
+//! is a glimpse no more than [`level::PIXELS_MAX`] pixels of them.
 
 mod directories;
 mod draw;
@@ -16,7 +16,7 @@ mod level;
 mod picture;
 mod unpack;
 
-pub use draw::{Keep, Square};
+pub use draw::{Care, Keep, Square};
 pub use picture::Imagery;
 
 #[cfg(test)]

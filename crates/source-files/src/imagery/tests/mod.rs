@@ -13,6 +13,7 @@ use crate::crs::Crs;
 
 mod jpeg;
 mod kinds;
+mod whole;
 mod writer;
 
 const UTM: &str = "EPSG:32611";
