@@ -3,9 +3,9 @@
 //! left out, and in the coarse mesh load modules that are holes for more than half.
 //!
 //! Where load modules have coarser levels, those of a square are a mesh between the two, level by level. Decks, ribbons
-//! and objects are nodes of their own in the files of groups and levels; a level lacks objects that are no higher than
-//! its error, and ribbons that are no wider; the coarse mesh of a square has none of them, and one class. From sides
-//! that squares share hang skirts, as neighbours may be shown at other levels.
+//! and objects are nodes of their own in the files of groups and levels; a level lacks objects, but for woods, that are
+//! no higher than its error, and ribbons that are no wider; the coarse mesh of a square has none of them, and one
+//! class. From sides that squares share hang skirts, as neighbours may be shown at other levels.
 //!
 //! Every square has a frame of its own, so that 32-bit floats are fine to a fraction of a millimetre. A geometric error
 //! is measured: of a square, how far its load modules lie from it; of a level in it and of a group, the largest
@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
-use terrain::{ModuleRect, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{ModuleRect, ObjectKind, QUANTA_PER_METRE, metres_of_quanta};
 
 use crate::coarse::Coarse;
 use crate::detail::{Step, largest_residual_m, steps};
@@ -25,6 +25,7 @@ use crate::glb_features::FoundFeatures;
 use crate::globe::{Globe, LocalFrame};
 use crate::mesh::{Mesh, Part};
 use crate::modules::{group_name, sheet_name};
+use crate::objects::Thing;
 use crate::openflight::{square_name, square_side};
 use crate::product::is_band;
 use crate::skirts::{Depths, Side, Skirt, depths};
@@ -308,8 +309,8 @@ fn with_skirt(node: GltfNode, triangles: &[[u32; 3]], classes: &[u8], skirt: &Sk
 }
 
 impl Layer {
-    /// The sheets of a rectangle; of a coarser level without objects and ribbons whose height and width are no larger
-    /// than its error.
+    /// The sheets of a rectangle; of a coarser level without ribbons, and objects other than woods, whose width or
+    /// height is no larger than its error.
     fn parts(&self, rect: ModuleRect, step: &Step) -> Parts {
         let mut parts = self.mesh.parts(&self.product, rect);
         let is_finest = step.near_m == 0.0;
@@ -321,7 +322,12 @@ impl Layer {
         let widest = bands.map(|line| line.traits.width).max().unwrap_or(0);
         for (sheet, part) in &mut parts {
             match sheet {
-                Sheet::Objects => *part = part.of_things(|thing| least < f64::from(thing.height)),
+                // Woods cover ground, which would have another colour without them.
+                Sheet::Objects => {
+                    let is_wood = |kind| matches!(kind, ObjectKind::Wood | ObjectKind::Scrub | ObjectKind::Orchard);
+                    let is_seen = |thing: &Thing| is_wood(thing.kind) || least < f64::from(thing.height);
+                    *part = part.of_things(is_seen);
+                }
                 Sheet::Ribbons if f64::from(widest) <= least => *part = Part::default(),
                 _ => {}
             }
@@ -680,8 +686,8 @@ mod tests {
         };
         assert_eq!(heights(level, &with_error(1399)), all);
         assert_eq!(heights(level, &with_error(1400)), ["tower_roof", "tower_wall", "wood_top", "wood_side"]);
-        assert_eq!(heights(level, &with_error(1920)), ["tower_roof", "tower_wall"]);
-        assert!(heights(level, &with_error(7100)).is_empty());
+        assert_eq!(heights(level, &with_error(7099)), ["tower_roof", "tower_wall", "wood_top", "wood_side"]);
+        assert_eq!(heights(level, &with_error(7100)), ["wood_top", "wood_side"]);
         assert_eq!(heights(group, &with_error(7100)), all);
         // A road of 896 quanta and a stream of 256.
         let mut product = samples::with_ways();
