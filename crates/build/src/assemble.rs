@@ -242,14 +242,14 @@ fn heights_of(levels: &[Vec<LoadModule>]) -> (i32, i32) {
 pub(crate) fn read_assembled(
     run: &Run,
     tins: &[Published],
+    removed: &[Vec<LatticePoint>],
     tile: TileId,
 ) -> Result<Option<(Assembled, Sums)>, CompileError> {
     let (area, folder, window) = (&run.area, run.database.folder(), run.window(tile)?);
     let manifest = run.previous.as_ref().expect("a tile is run again only where a build has ended");
     let (header, mut levels) = folder.read_levels(manifest, tile)?;
     let objects = run.outlines.as_ref().map(|(_, outlines)| TileObjects::of(outlines, area, tile));
-    let none = vec![Vec::new(); tins.len()];
-    if header.fingerprint != made_from(run, &|index| tins[index].stamp, &none, tile, objects.as_ref())? {
+    if header.fingerprint != made_from(run, &|index| tins[index].stamp, removed, tile, objects.as_ref())? {
         return Ok(None);
     }
     let file = folder.stamp_file(&folder.modules_path(tile))?;

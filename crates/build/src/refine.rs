@@ -21,6 +21,8 @@ pub(crate) struct Published {
     pub stamp: Stamp,
     /// Why selection ended.
     pub stop: StopReason,
+    /// Triangles that its own points cost.
+    pub charged: u32,
     /// What limits kept out, by load module, in ascending order.
     pub refused: Vec<(ModuleId, RefusedPosts)>,
     /// The same by parts; unknown where an earlier build did not say.
@@ -33,8 +35,9 @@ impl Published {
     /// Of a TIN that is published with this stamp, kept for the next that asks for it.
     pub fn keep(run: &Run, tin: TileTin, stamp: Stamp, made_from: Option<Parts>) -> Self {
         let (tile, stop, refused) = (tin.tile, tin.stop, by_module(&tin.refused));
+        let charged = tin.triangles_charged;
         run.tins.keep(stamp, Arc::new(tin));
-        Self { tile, stamp, stop, refused, made_from, cause: None }
+        Self { tile, stamp, stop, charged, refused, made_from, cause: None }
     }
 }
 

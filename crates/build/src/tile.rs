@@ -115,7 +115,8 @@ fn reassemble(
     let (none, adding) = (vec![Vec::new(); tins.len()], Adding::default());
     let done = run.for_each_tile(Stage::Assemble, progress, |tile| {
         let is_reached = reached.iter().any(|&(other, _)| other == tile);
-        let done = match if is_reached { None } else { read_assembled(run, tins, tile)? } {
+        let kept = if is_reached { None } else { read_assembled(run, tins, &none, tile)? };
+        let done = match kept {
             Some(read) => Outcome::Kept(read),
             None => assemble_tile(run, &|index| tins[index].stamp, &none, tile)?,
         };
@@ -244,11 +245,9 @@ fn beside_others<'a>(
     let (budget, index) = (&run.area.budget, run.area.tiling.index(tile));
     let mut share = shares.tiles[index].clone();
     if let Some(allowance) = &mut share.allowance {
-        let mut taken = budget.start_total();
-        for other in tins.iter().filter(|other| other.tile != tile) {
-            taken += u64::from(run.tin(other.tile, &other.stamp)?.triangles_charged);
-        }
-        allowance.triangles = u64::from(allowance.triangles).min(budget.area.saturating_sub(taken)) as u32;
+        let others = tins.iter().filter(|other| other.tile != tile).map(|other| u64::from(other.charged));
+        let left = budget.area.saturating_sub(budget.start_total() + others.sum::<u64>());
+        allowance.triangles = u64::from(allowance.triangles).min(left) as u32;
     }
     Refining::new(run, &share, seeds(run, tins, tile)?, tile)
 }

@@ -15,7 +15,7 @@ use toml::de::DeTable;
 use crate::bounds::{COARSER_LEVELS_MAX, MODULES_PER_TILE_MIN, TILES_MAX, WINDOW_M};
 use crate::entry::{Document, Entry, Section, check_sections, in_32_bits};
 use crate::files::Mention;
-use crate::keys::nearest;
+use crate::keys::{nearest, usual_text};
 use crate::{
     AreaPlace, DemSource, Fault, FeaturesSpec, FindArea, Job, JobError, LimitsSpec, LodSpec, NoArea, SourceFile,
     TilesSpec, WindowLimit, files, is_remote,
@@ -187,9 +187,6 @@ fn read_tiles(tiles: &Section, grid: &ModuleGrid) -> Result<TilesSpec, JobError>
     }
 }
 
-/// Tiles along a side of the area where it has room for them, as the table of keys says.
-const USUAL_TILES: u32 = 6;
-
 /// How many tiles there are along one side of the area: as the job says, or the usual number, fewer where they
 /// would be too narrow.
 fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
@@ -197,8 +194,8 @@ fn along(tiles: &Section, key: &str, modules: u32) -> Result<u32, JobError> {
     let what = format!("tiles of {modules} load modules, at least two each");
     match tiles.optional(key) {
         Some(entry) => entry.whole_in(&(1..=most.into()), &what).map(in_32_bits).map_err(|error| match error {
-            // The usual number is more than there can be here.
-            JobError::OutOfRange(fault) if most < USUAL_TILES => {
+            // The usual number may be more than there can be here.
+            JobError::OutOfRange(fault) if usual_text(&fault.key).parse().is_ok_and(|usual: u32| most < usual) => {
                 JobError::OutOfRange(Box::new(Fault { hint: format!("for example {key} = {most}"), ..*fault }))
             }
             error => error,
