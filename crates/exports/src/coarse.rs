@@ -1,6 +1,8 @@
 //! The coarser mesh of a square: two triangles to a load module, over the corners that load modules have anyway; and
 //! how far the ground lies from it, measured exactly.
 
+use std::collections::BTreeMap;
+
 use terrain::{HOLE_CLASS, LoadModule, ModuleId, ModuleRect, QUANTA_PER_METRE};
 
 use crate::Product;
@@ -14,6 +16,8 @@ pub(crate) struct Coarse {
     pub vertices: Vec<u32>,
     /// Corners by place in `vertices`, counter-clockwise.
     pub triangles: Vec<[u32; 3]>,
+    /// For each triangle the class that most of its load module has.
+    pub classes: Vec<u8>,
     /// Largest distance, straight up or down, between these triangles and those of the mesh, in metres; a load module's
     /// side where one is a hole in part.
     pub error_m: f64,
@@ -31,13 +35,12 @@ impl Coarse {
         let wide = rect.cols() + 1;
         for (row, col) in (0..rect.rows()).flat_map(|row| (0..rect.cols()).map(move |col| (row, col))) {
             let id = ModuleId { row: rect.south + row, col: rect.west + col };
-            if product.module(id).is_some_and(is_mostly_hole) {
-                continue;
-            }
+            let Some(class) = product.module(id).map_or(Some(0), usual_class) else { continue };
             let south_west = row * wide + col;
             let (south_east, north_west) = (south_west + 1, south_west + wide);
             let north_east = north_west + 1;
             coarse.triangles.extend([[south_west, south_east, north_east], [south_west, north_east, north_west]]);
+            coarse.classes.extend([class; 2]);
         }
         let modules = || rect.iter().filter_map(|id| product.module(id));
         // Where ground ends inside of a load module, these two triangles are there or not: it may be its side off.
@@ -73,8 +76,8 @@ fn has_ground_in_part(module: &LoadModule) -> bool {
     0 < holes && holes < module.classes.len()
 }
 
-/// Whether no source has a height over more than half of a load module.
-fn is_mostly_hole(module: &LoadModule) -> bool {
+/// The class that covers most of a load module; `None` where no source has a height over more than half of it.
+fn usual_class(module: &LoadModule) -> Option<u8> {
     let doubled_area = |triangle: &[u16; 3]| {
         let [a, b, c] = triangle.map(|v| {
             let v = module.vertices[usize::from(v)];
@@ -82,9 +85,15 @@ fn is_mostly_hole(module: &LoadModule) -> bool {
         });
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     };
-    let triangles = module.triangles.iter().zip(&module.classes);
-    let holes: i64 = triangles.filter(|(_, class)| **class == HOLE_CLASS).map(|(own, _)| doubled_area(own)).sum();
-    i64::from(module.side) * i64::from(module.side) < holes
+    let mut areas = BTreeMap::from([(HOLE_CLASS, 0)]);
+    for (triangle, &class) in module.triangles.iter().zip(&module.classes) {
+        *areas.entry(class).or_insert(0) += doubled_area(triangle);
+    }
+    let holes = areas.remove(&HOLE_CLASS).unwrap_or(0);
+    let is_hole = i64::from(module.side) * i64::from(module.side) < holes;
+    // Of two that cover as much, that of the lower number.
+    let widest = areas.into_iter().rev().max_by_key(|(_, area)| *area);
+    if is_hole { None } else { widest.map(|(class, _)| class) }
 }
 
 /// Largest distance in quanta between a load module and the two triangles over its corners. Both are flat between

@@ -1,5 +1,6 @@
-//! Skirts: walls that hang from the sides of a square of 3D Tiles behind which another one goes on. A neighbour may be
-//! shown at another level, whose ground is lower or higher along their common side; walls close what would be a gap.
+//! Skirts: walls that hang from the sides of a square of 3D Tiles. A neighbour, of this database or of one beside it,
+//! may be shown at another level, whose ground is lower or higher along their common side; walls close what would be a
+//! gap.
 
 use std::collections::HashMap;
 
@@ -15,18 +16,11 @@ pub(crate) struct Side {
 }
 
 impl Side {
-    /// The sides of a rectangle behind which its product goes on.
-    pub(crate) fn within(product: &Product, rect: ModuleRect) -> Vec<Self> {
-        let whole = product.rect;
+    /// The sides of a rectangle.
+    pub(crate) fn of(product: &Product, rect: ModuleRect) -> [Self; 4] {
         let [west, south] = product.corner(ModuleId { row: rect.south, col: rect.west });
         let [east, north] = product.corner(ModuleId { row: rect.north, col: rect.east });
-        let all = [
-            (whole.west < rect.west, 0, west),
-            (rect.east < whole.east, 0, east),
-            (whole.south < rect.south, 1, south),
-            (rect.north < whole.north, 1, north),
-        ];
-        all.into_iter().filter(|(goes_on, ..)| *goes_on).map(|(_, axis, at)| Self { axis, at }).collect()
+        [(0, west), (0, east), (1, south), (1, north)].map(|(axis, at)| Self { axis, at })
     }
 
     fn holds(self, place: [i32; 3]) -> bool {
