@@ -47,6 +47,7 @@ mod entry;
 mod feature_keys;
 mod files;
 mod load;
+pub use load::place_of;
 mod read;
 mod sections;
 mod setting_list;

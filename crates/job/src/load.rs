@@ -4,8 +4,24 @@ use std::fs;
 use std::io::{self, Read};
 use std::path::Path;
 
+use toml::de::DeTable;
+
 use crate::bounds::JOB_BYTES_MAX;
+use crate::entry::Document;
 use crate::{FindArea, Job, JobError, fetched, files, read};
+
+/// Where the job file at `path` says `key`, as `mine.toml:12`; `None` where it does not, or cannot be read.
+pub fn place_of(path: &Path, key: &str) -> Option<String> {
+    let text = text_of(path).ok()?;
+    let root = DeTable::parse(&text).ok()?;
+    let (mut table, mut offset) = (Some(root.get_ref()), 0);
+    for name in key.split('.') {
+        let (found, value) = table?.iter().find(|(found, _)| found.get_ref() == name)?;
+        offset = found.span().start;
+        table = value.get_ref().as_table();
+    }
+    Some(format!("{}:{}", path.display(), Document { path, text: &text }.line(offset)))
+}
 
 impl Job {
     /// Reads the job file at `path` and finds the files it names.

@@ -148,6 +148,16 @@ impl Failure {
         if self.message.contains(part) { Self { hint: Some(hint.into()), ..self } } else { self }
     }
 
+    /// The same, with the line of the job file at `path` that says the key which the message begins with, if one does.
+    pub fn in_job(self, path: &Path) -> Self {
+        let is_of_key = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_.".contains(c);
+        let key = self.message.split(|c| !is_of_key(c)).next().unwrap_or_default();
+        match job::place_of(path, key) {
+            Some(place) => Self { message: format!("{place}: {}", self.message), ..self },
+            None => self,
+        }
+    }
+
     /// Prints it and gives the exit code.
     pub fn tell(&self) -> u8 {
         terminal::tell(&self.to_string());

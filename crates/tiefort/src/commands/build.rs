@@ -25,7 +25,7 @@ again.";
 pub struct Arguments {
     /// The job file
     #[arg(value_name = "JOB.toml")]
-    job: PathBuf,
+    pub(super) job: PathBuf,
     #[command(flatten)]
     run: RunArguments,
     /// Keep nothing of an earlier build

@@ -35,6 +35,8 @@ mod verify;
 mod view;
 mod worker;
 
+use std::path::Path;
+
 use clap::Subcommand;
 
 use crate::failure::{Failure, Outcome};
@@ -104,6 +106,23 @@ impl Command {
     /// # Errors
     /// Why it could not be done, for a person to read.
     pub fn run(self) -> Result<Outcome, Failure> {
+        let job = self.job().map(Path::to_owned);
+        self.done().map_err(|failure| job.iter().fold(failure, |failure, job| failure.in_job(job)))
+    }
+
+    /// The job that it works by, if it does.
+    fn job(&self) -> Option<&Path> {
+        match self {
+            Command::Build(arguments) => Some(&arguments.job),
+            Command::Tile(arguments) => Some(&arguments.job),
+            Command::Plan(arguments) => Some(&arguments.job),
+            Command::Task(arguments) => Some(&arguments.job),
+            Command::Worker(arguments) => Some(&arguments.job),
+            _ => None,
+        }
+    }
+
+    fn done(self) -> Result<Outcome, Failure> {
         match self {
             Command::Init(arguments) => init::run(&arguments),
             Command::Sources(arguments) => sources::run(&arguments),

@@ -41,7 +41,7 @@ worker.";
 pub struct Arguments {
     /// The job file
     #[arg(value_name = "JOB.toml")]
-    job: PathBuf,
+    pub(super) job: PathBuf,
     /// Print it for a program instead of for a person
     #[arg(long, value_name = "FORMAT")]
     emit: Option<Emit>,

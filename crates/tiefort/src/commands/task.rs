@@ -34,7 +34,7 @@ not done yet: try again.";
 pub struct Arguments {
     /// The job file
     #[arg(value_name = "JOB.toml")]
-    job: PathBuf,
+    pub(super) job: PathBuf,
     /// What to do
     #[arg(value_name = "STAGE", value_parser = one_of(ORDER.map(|stage| (stage.name(), stage, stage.meaning()))))]
     stage: Stage,

@@ -25,7 +25,7 @@ and the tile is marked frozen, until a build makes it whole.";
 pub struct Arguments {
     /// The job file
     #[arg(value_name = "JOB.toml")]
-    job: PathBuf,
+    pub(super) job: PathBuf,
     /// Row and column of the tile, counted from the south-west
     #[arg(value_name = "ROW,COL", value_parser = row_col, allow_hyphen_values = true)]
     tile: TileId,

@@ -33,7 +33,7 @@ const PAUSE: Duration = Duration::from_millis(200);
 pub struct Arguments {
     /// The job file
     #[arg(value_name = "JOB.toml")]
-    job: PathBuf,
+    pub(super) job: PathBuf,
     #[command(flatten)]
     run: RunArguments,
     /// Seconds of silence after which a worker's work is done by another
