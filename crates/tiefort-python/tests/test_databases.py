@@ -343,6 +343,8 @@ def test_a_database_goes_to_another_process_and_answers_are_compared_as_what_the
         again = pickle.loads(pickle.dumps(opened))
         middle = [(opened.bounds[0] + opened.bounds[2]) / 2, (opened.bounds[1] + opened.bounds[3]) / 2]
         assert again.heights(middle) == opened.heights(middle)
+        job = pickle.loads(pickle.dumps(tiefort.Job(JOB)))
+        assert job.settings == tiefort.Job(JOB).settings
         eye = [*middle, 2.0]
         first, second = opened.line_of_sight(eye, eye), again.line_of_sight(eye, eye)
         assert first == first and first != second and len({first, second}) == 2

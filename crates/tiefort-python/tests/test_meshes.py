@@ -341,6 +341,18 @@ def test_meshes_go_to_other_packages() -> None:
     print(f"{tried} of 4 packages tried")
 
 
+def test_meshes_can_be_pickled() -> None:
+    import pickle
+
+    mesh = tiefort.tin(hills(), triangles=50)
+    again = pickle.loads(pickle.dumps(mesh))
+    assert np.array_equal(again.vertices, mesh.vertices) and again.residual == mesh.residual
+    places = mesh.vertices[:5, :2] + 0.25
+    assert np.allclose(again.sample(places), mesh.sample(places), equal_nan=True)
+    with pytest.raises(tiefort.RequestError, match="not made here"):
+        again.save("mesh.ply")
+
+
 def test_failures_can_be_pickled() -> None:
     import pickle
 

@@ -71,14 +71,24 @@ class Job:
         if not isinstance(job, Mapping):
             message = f"found a {type(job).__name__} as a job, expected a dictionary"
             raise JobError(message, "Job.load(PATH) reads a job file")
-        self._job = _tiefort.Job.of_text(_toml(job), "Job(dict)")
+        self._read(_toml(job), "Job(dict)")
 
     @classmethod
     def load(cls, path: Path) -> Job:
         """Read a job file; paths in it begin at its folder."""
         loaded = cls.__new__(cls)
         loaded._job = _tiefort.Job.load(path_of(path))
+        loaded._text, loaded._path = None, path_of(path)
         return loaded
+
+    def _read(self, text: str, path: str) -> None:
+        self._job = _tiefort.Job.of_text(text, path)
+        self._text: str | None = text
+        self._path = path
+
+    def __reduce__(self) -> tuple[Callable[[str | None, str], Job], tuple[str | None, str]]:
+        # Another process reads it again.
+        return _read_again, (self._text, os.path.abspath(self._path))
 
     @property
     def name(self) -> str:
@@ -92,6 +102,14 @@ class Job:
 
     def __repr__(self) -> str:
         return f"Job({self.name!r})"
+
+
+def _read_again(text: str | None, path: str) -> Job:
+    if text is None:
+        return Job.load(path)
+    job = Job.__new__(Job)
+    job._read(text, path)
+    return job
 
 
 AnyJob = Union[Job, Mapping[str, Any], Path]

@@ -41,7 +41,7 @@ class Residual:
 
 
 class Mesh:
-    """Triangles over ground.
+    """Triangles over ground. A pickled mesh of heights keeps its arrays and figures, and cannot be saved.
 
     Attributes
     ----------
@@ -101,6 +101,9 @@ class Mesh:
     def _of_tin(cls, tin: _tiefort.Tin) -> Mesh:
         crs = None if tin.epsg is None else f"EPSG:{tin.epsg}"
         return cls(tin.vertices(), tin.triangles(), Residual(**tin.residual()), crs, tin=tin)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_tin": None}
 
     def __repr__(self) -> str:
         return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, RMS {self.residual.rms_m:.3f} m)"
