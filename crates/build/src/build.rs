@@ -53,7 +53,9 @@ pub fn build(
         return Ok(built);
     }
     let mut run = open(job, folder, options, progress)?;
-    if options.fresh {
+    // Files of tiles of another size, or heights above something else, are of no use.
+    let is_other = |previous: &Manifest| previous.area != database_area(job);
+    if options.fresh || run.previous.as_ref().is_some_and(is_other) {
         run.previous = None;
         run.database.begin_afresh(&beginning(&run))?;
     } else {

@@ -339,6 +339,9 @@ fn enter(
         drop(database);
         match Database::create_or_open(folder, area) {
             Ok((_, Some(manifest))) if is_under_way(&manifest) => {}
+            Ok((database, Some(previous))) if previous.area != *area => {
+                database.begin_afresh(&beginning_of(job, records, None))?;
+            }
             Ok((database, previous)) => database.begin(&beginning_of(job, records, previous.as_ref()))?,
             Err(DatabaseError::Locked { .. }) => clock.wait(PAUSE),
             Err(error) => return Err(error.into()),

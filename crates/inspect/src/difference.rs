@@ -88,11 +88,10 @@ pub fn difference(first: &Path, second: &Path, workers: usize) -> Result<Differe
     })
 }
 
-/// Whether load modules of both cover the same squares at the same posts; names and tiles may differ.
+/// Whether load modules of both cover the same squares at the same posts; names may differ.
 fn check_same_ground(first: &Opened, second: &Opened, path: &Path) -> Result<(), CompileError> {
     let (mut area, other) = (first.manifest.area.clone(), &second.manifest.area);
-    (area.name, area.vertical_datum) = (other.name.clone(), other.vertical_datum.clone());
-    (area.tile_rows, area.tile_cols) = (other.tile_rows, other.tile_cols);
+    area.name.clone_from(&other.name);
     let Some((key, expected, found)) = area.difference(other) else { return Ok(()) };
     Err(GroundError::Impossible {
         key: format!("{}: {key}", path.display()),

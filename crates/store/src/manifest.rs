@@ -47,7 +47,8 @@ pub enum ManifestState {
     Complete,
 }
 
-/// The gaming area: what must agree for two builds to share a directory.
+/// The gaming area. For two builds to share a directory all must agree but its tiles and what heights are above, which
+/// may change: then nothing of the earlier one is kept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Area {
     /// Its name.
@@ -82,22 +83,17 @@ impl Area {
         is_there.then(|| ModuleRect::of_tile(tile, modules, tiles))
     }
 
-    /// The first key in which `self` differs from `other`, with both values.
+    /// The first key in which `self` is other ground than `other`, with both values.
     pub fn difference(&self, other: &Area) -> Option<(&'static str, String, String)> {
-        let datum =
-            |area: &Area| if area.vertical_datum.is_empty() { "none".into() } else { area.vertical_datum.clone() };
         let pairs = [
             ("name", self.name.clone(), other.name.clone()),
             ("crs", self.crs.clone(), other.crs.clone()),
-            ("vertical_datum", datum(self), datum(other)),
             ("origin_m", format!("{:?}", self.origin_m), format!("{:?}", other.origin_m)),
             ("size_m", format!("{:?}", self.size_m), format!("{:?}", other.size_m)),
             ("spacing_m", self.spacing_m.to_string(), other.spacing_m.to_string()),
             ("module_side_m", self.module_side_m.to_string(), other.module_side_m.to_string()),
             ("module_rows", self.module_rows.to_string(), other.module_rows.to_string()),
             ("module_cols", self.module_cols.to_string(), other.module_cols.to_string()),
-            ("tile_rows", self.tile_rows.to_string(), other.tile_rows.to_string()),
-            ("tile_cols", self.tile_cols.to_string(), other.tile_cols.to_string()),
         ];
         pairs.into_iter().find(|(_, mine, others)| mine != others)
     }

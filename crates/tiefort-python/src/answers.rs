@@ -1,16 +1,17 @@
 //! A finished database that answers: heights, normals, classes, lines of sight, load modules.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use load_module_reader::{
-    Area, Block, Curvature, HOLE_CLASS, Hider, Keep, LoadedGround, PastObjects, ProfilePoint, QUANTA_PER_METRE,
-    ReadError, Sight, Standing,
+    Area, Block, Curvature, HOLE_CLASS, Hider, LoadedGround, PastObjects, ProfilePoint, QUANTA_PER_METRE, ReadError,
+    Sight, Standing,
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use store::Folder;
+use tiefort::contents::Opened;
 use tiefort::library::{self, Cause, Failure};
 
 use crate::arrays::{places, table};
@@ -35,7 +36,7 @@ pub struct Ground {
 
 #[derive(Clone)]
 struct Held {
-    area: Arc<Area>,
+    opened: Arc<Opened>,
     ground: Option<Arc<LoadedGround>>,
 }
 
@@ -60,14 +61,16 @@ impl Ground {
 
     /// Ground that holds all load modules of a block.
     fn loaded(&self, mut held: Held, wanted: Block) -> Result<Arc<LoadedGround>, Failure> {
-        let whole = held.area.whole();
+        let area = &held.opened.area;
+        let whole = area.whole();
         let wanted = if whole.count() <= WHOLE_MAX { whole } else { wanted };
         if let Some(ground) = held.ground.as_ref().filter(|ground| contains(ground.block(), wanted)) {
             return Ok(Arc::clone(ground));
         }
+        held.opened.contents.files_of(wanted)?;
         let ground = match &held.ground {
-            Some(ground) => ground.moved(&held.area, wanted),
-            None => held.area.load(wanted),
+            Some(ground) => ground.moved(area, wanted),
+            None => area.load(wanted),
         };
         let ground = Arc::new(ground.map_err(|error| unreadable(&error))?);
         held.ground = Some(Arc::clone(&ground));
@@ -92,7 +95,7 @@ impl Ground {
             // Python may change its array meanwhile.
             let places = places.to_vec();
             let asked = py.detach(|| {
-                let block = around(&held.area, &places);
+                let block = around(&held.opened.area, &places);
                 self.loaded(held, block).map(|ground| each(&ground, &places, answers))
             });
             asked.map_err(|failure| raised(py, &failure))?;
@@ -199,9 +202,9 @@ impl Ground {
     /// Opens the database in a folder.
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let opened = py.detach(|| open(&path));
-        let area = opened.map_err(|failure| raised(py, &failure))?;
-        let held = Held { area: Arc::new(area), ground: None };
+        let opened = py.detach(|| Opened::open(&path));
+        let opened = opened.map_err(|failure| raised(py, &failure))?;
+        let held = Held { opened: Arc::new(opened), ground: None };
         Ok(Self { path, held: Mutex::new(Some(held)) })
     }
 
@@ -213,7 +216,7 @@ impl Ground {
     /// Where load modules lie: south-west corner, side, rows, columns, levels, system, vertical datum.
     fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let held = self.held(py)?;
-        let (frame, found) = (held.area.frame(), PyDict::new(py));
+        let (frame, found) = (held.opened.area.frame(), PyDict::new(py));
         found.set_item("origin_m", frame.origin_m)?;
         found.set_item("side_m", frame.side_m())?;
         found.set_item("rows", frame.rows)?;
@@ -290,7 +293,7 @@ impl Ground {
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (held, through) = (self.held(py)?, places(&xy)?.to_vec());
         let found = py.detach(|| {
-            let block = around(&held.area, &through);
+            let block = around(&held.opened.area, &through);
             self.loaded(held, block).map(|ground| ground.profile(&through, spacing_m))
         });
         let row = |point: ProfilePoint| {
@@ -365,7 +368,7 @@ impl Ground {
         let held = self.held(py)?;
         let reached = [-1.0, 1.0].map(|side| [place_m[0] + side * radius_m, place_m[1] + side * radius_m]);
         let found = py.detach(|| {
-            let block = around(&held.area, &reached);
+            let block = around(&held.opened.area, &reached);
             self.loaded(held, block).map(|ground| ground.obstacle_at(place_m, radius_m))
         });
         let found = found.map_err(|failure| raised(py, &failure))?;
@@ -374,14 +377,16 @@ impl Ground {
 
     /// What stands on the ground: pieces of prisms, and of canopies.
     fn objects(&self, py: Python<'_>) -> PyResult<(Vec<PrismRow>, Vec<CanopyRow>)> {
-        let area = self.held(py)?.area;
-        wait(py, None, move |_, _| objects_of(&area).map_err(|error| unreadable(&error)))
+        let opened = self.held(py)?.opened;
+        wait(py, None, move |_, _| objects_of(whole(&opened)?).map_err(|error| unreadable(&error)))
     }
 
     /// One load module at a level of detail.
     fn module<'py>(&self, py: Python<'py>, row: u32, col: u32, level: u16) -> PyResult<ModuleArrays<'py>> {
-        let area = self.held(py)?.area;
+        let opened = self.held(py)?.opened;
+        let area = &opened.area;
         let block = Block { south: row, west: col, north: row.saturating_add(1), east: col.saturating_add(1) };
+        py.detach(|| opened.contents.files_of(block).map(drop)).map_err(|failure| raised(py, &failure))?;
         let loaded = py.detach(|| area.load_level(block, level));
         let loaded = loaded.map_err(|error| {
             let (rows, cols) = (area.frame().rows, area.frame().cols);
@@ -412,8 +417,8 @@ impl Ground {
 
     /// A row for each load module: row, column, triangles, vertices, posts measured, RMS and largest residual.
     fn modules<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let area = self.held(py)?.area;
-        let rows = wait(py, None, move |_, _| rows_of(&area).map_err(|error| unreadable(&error)))?;
+        let opened = self.held(py)?.opened;
+        let rows = wait(py, None, move |_, _| rows_of(whole(&opened)?).map_err(|error| unreadable(&error)))?;
         table(py, rows.into_iter())
     }
 }
@@ -473,8 +478,8 @@ fn rows_of(area: &Area) -> Result<Vec<[f64; 7]>, ReadError> {
     Ok(all)
 }
 
-/// The load modules of a database that a build has finished.
-fn open(path: &Path) -> Result<Area, Failure> {
-    Folder::new(path).finished()?;
-    Area::open(path, Keep::OnDisk).map_err(|error| unreadable(&error))
+/// The load modules of a database, all of whose files are of its build.
+fn whole(opened: &Opened) -> Result<&Area, Failure> {
+    opened.contents.files_of(opened.area.whole())?;
+    Ok(&opened.area)
 }

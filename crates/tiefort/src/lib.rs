@@ -20,6 +20,7 @@ mod catalogue;
 mod certificate;
 mod clock;
 mod commands;
+pub mod contents;
 mod engines;
 mod estimate;
 mod events;

@@ -1,10 +1,8 @@
 //! Places on the map as arguments, and the ground under them.
 
-use std::path::Path;
+use load_module_reader::{Area, AreaFrame, Block, Standing};
 
-use load_module_reader::{Area, AreaFrame, Block, Keep, LoadedGround, ReadError, Standing};
-
-use crate::failure::{Cause, Failure};
+use crate::failure::Failure;
 
 /// How far air usually bends light, as a part of the earth's own curvature.
 pub const REFRACTION: f64 = 0.13;
@@ -53,24 +51,11 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     all.try_into().ok()
 }
 
-/// Opens the load modules of a database.
+/// The load modules within so many metres of places, as far as the area goes.
 ///
 /// # Errors
-/// When there are none, or they are damaged.
-pub fn open(database: &Path) -> Result<Area, Failure> {
-    Area::open(database, Keep::OnDisk).map_err(|error| match error {
-        ReadError::Unreadable { .. } | ReadError::NoFiles { .. } => {
-            Failure::about(Cause::Database, error, "give the folder of a terrain database that is built")
-        }
-        error => unreadable(&error),
-    })
-}
-
-/// The ground within so many metres of places, as far as the area goes.
-///
-/// # Errors
-/// When a load module is damaged or missing, or there are too many.
-pub fn ground_around(area: &Area, places_m: &[[f64; 2]], range_m: f64) -> Result<LoadedGround, Failure> {
+/// When there are too many.
+pub fn block_around(area: &Area, places_m: &[[f64; 2]], range_m: f64) -> Result<Block, Failure> {
     let reach = (range_m / area.frame().side_m()).ceil() as u32;
     let blocks = places_m.iter().map(|&place_m| area.block_around(place_m, reach));
     let block = blocks.reduce(around_both).unwrap_or(Block { south: 0, west: 0, north: 0, east: 0 });
@@ -78,7 +63,7 @@ pub fn ground_around(area: &Area, places_m: &[[f64; 2]], range_m: f64) -> Result
         let message = format!("found {} load modules between these places, expected {MODULES_MAX}", block.count());
         return Err(Failure::new(message + " at most", "ask for a smaller range, or for places nearer to each other"));
     }
-    area.load(block).map_err(|error| unreadable(&error))
+    Ok(block)
 }
 
 fn around_both(a: Block, b: Block) -> Block {
@@ -88,10 +73,6 @@ fn around_both(a: Block, b: Block) -> Block {
         north: a.north.max(b.north),
         east: a.east.max(b.east),
     }
-}
-
-fn unreadable(error: &ReadError) -> Failure {
-    Failure::about(Cause::Database, error, "`tiefort verify` says what is damaged; a build mends it")
 }
 
 /// What to say of a place of an argument that has no ground.

@@ -379,21 +379,28 @@ fn ground_within_sight_of_a_tile_has_it_refined_again_and_lines_of_sight_can_be_
 }
 
 #[test]
+fn other_tiles_of_the_same_ground_leave_nothing_of_the_ones_before() {
+    let mut scene = Scene::new(&Words { tiles: (3, 3), ..Words::sample() });
+    drop(scene.build("area", 2));
+    let job = Words { tiles: (2, 1), ..Words::sample() }.text();
+    scene.job = Job::from_text(&job, &scene.path("job.toml")).unwrap();
+    let (_, refined) = rebuilt(&scene, "fewer tiles");
+    assert_eq!(refined.len(), 2);
+    scene.verify("area");
+}
+
+#[test]
 fn another_area_is_refused_and_nothing_is_touched() {
     let scene = Scene::new(&Words::sample());
     drop(scene.build("area", 2));
     let before = scene.product("area");
-    for (change, key) in [
-        (Words { size: (10, 10), ..Words::sample() }, "size_m"),
-        (Words { tiles: (3, 2), ..Words::sample() }, "tile_cols"),
-    ] {
-        let job = Job::from_text(&change.text(), &scene.path("job.toml")).unwrap();
-        for fresh in [false, true] {
-            let stop = false.into();
-            let options = build::Options { fresh, ..crate::scene::options(1, &stop) };
-            let error = build::build(&job, &scene.path("area"), &options, &mut crate::scene::Silent).unwrap_err();
-            assert!(error.to_string().contains(key) && error.hint().is_some(), "{error}");
-        }
+    let job = Words { size: (10, 10), ..Words::sample() }.text();
+    let job = Job::from_text(&job, &scene.path("job.toml")).unwrap();
+    for fresh in [false, true] {
+        let stop = false.into();
+        let options = build::Options { fresh, ..crate::scene::options(1, &stop) };
+        let error = build::build(&job, &scene.path("area"), &options, &mut crate::scene::Silent).unwrap_err();
+        assert!(error.to_string().contains("size_m") && error.hint().is_some(), "{error}");
     }
     assert_same(&before, &scene.product("area"), "refused");
 }

@@ -185,9 +185,9 @@ fn another_area_or_version_is_refused() {
     let dir = folder.path().join("sample.tdb");
     build(&dir);
     let mut other = samples::area();
-    other.tile_cols = 3;
+    other.spacing_m = 3.0;
     let error = Database::create_or_open(&dir, &other).unwrap_err();
-    assert!(matches!(error, DatabaseError::OtherArea { key: "tile_cols", .. }), "{error}");
+    assert!(matches!(error, DatabaseError::OtherArea { key: "spacing_m", .. }), "{error}");
     let path = dir.join(files::DATABASE);
     let later = json::encode(&path, &std::collections::BTreeMap::from([("format_version", 99)])).unwrap();
     fs::write(&path, later).unwrap();

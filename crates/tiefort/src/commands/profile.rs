@@ -9,6 +9,7 @@ use serde_json::json;
 use views::grouped;
 
 use crate::arguments::positive;
+use crate::contents::Opened;
 use crate::failure::{Failure, Outcome};
 use crate::{places, terminal};
 
@@ -58,7 +59,8 @@ enum Format {
 
 /// Measures it.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let area = places::open(&arguments.database)?;
+    let database = Opened::open(&arguments.database)?;
+    let area = &database.area;
     for &place_m in &arguments.places {
         if !area.frame().holds(place_m) {
             return Err(places::outside("E,N", place_m, area.frame()));
@@ -71,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         let hint = "ask for a larger spacing or a shorter line";
         return Err(Failure::new(format!("{found}, expected {most} places at most"), hint));
     }
-    let ground = places::ground_around(&area, &arguments.places, 0.0)?;
+    let ground = database.load(places::block_around(area, &arguments.places, 0.0)?)?;
     let points = ground.profile(&arguments.places, arguments.spacing);
     terminal::print(&match arguments.format {
         Format::Text => text(&points),

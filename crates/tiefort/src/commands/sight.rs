@@ -6,13 +6,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use clap::Args;
 use exports::{ByteRaster, write_byte_raster};
 use load_module_reader::{
-    Area, Curvature, Eye, Hider, LoadedGround, Look, PastObjects, SEEN, Sight, Standing, TerrainModule, Viewshed,
+    Curvature, Eye, Hider, LoadedGround, Look, PastObjects, SEEN, Sight, Standing, TerrainModule, Viewshed,
 };
 use schedule::Workers;
 use terrain::Spacing;
 use views::{SeenGround, draw_seen, fold, grouped};
 
 use crate::arguments::{self, positive};
+use crate::contents::Opened;
 use crate::failure::{Failure, Outcome};
 use crate::{files, places, terminal};
 
@@ -102,15 +103,15 @@ fn refraction(text: &str) -> Result<f64, String> {
 
 /// Looks.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    let area = places::open(&arguments.database)?;
+    let database = Opened::open(&arguments.database)?;
     let curvature = if arguments.curvature {
         Curvature::of_earth(arguments.refraction.unwrap_or(places::REFRACTION))
     } else {
         Curvature::NONE
     };
     match (arguments.to, arguments.range, &arguments.out) {
-        (Some(to), ..) => line(arguments, &area, to, curvature),
-        (None, Some(range_km), Some(out)) => around(arguments, &area, 1000.0 * range_km, out, curvature),
+        (Some(to), ..) => line(arguments, &database, to, curvature),
+        (None, Some(range_km), Some(out)) => around(arguments, &database, 1000.0 * range_km, out, curvature),
         // The arguments say that one of them is there.
         (None, ..) => Err(Failure::new("found neither --to nor --range with --out", "see `tiefort sight --help`")),
     }
@@ -124,16 +125,16 @@ fn end(name: &str, [east, north, above]: [f64; 3], ground: &LoadedGround) -> Res
 }
 
 /// Whether one place sees another.
-fn line(arguments: &Arguments, area: &Area, to: [f64; 3], curvature: Curvature) -> Result<Outcome, Failure> {
+fn line(arguments: &Arguments, database: &Opened, to: [f64; 3], curvature: Curvature) -> Result<Outcome, Failure> {
     let plan = |place: [f64; 3]| [place[0], place[1]];
     let ends_m = [plan(arguments.from), plan(to)];
     // A place far outside must not ask for all that lies between.
     for (name, place_m) in ["--from", "--to"].into_iter().zip(ends_m) {
-        if !area.frame().holds(place_m) {
-            return Err(places::outside(name, place_m, area.frame()));
+        if !database.area.frame().holds(place_m) {
+            return Err(places::outside(name, place_m, database.area.frame()));
         }
     }
-    let ground = places::ground_around(area, &ends_m, 0.0)?;
+    let ground = database.load(places::block_around(&database.area, &ends_m, 0.0)?)?;
     let (from, to) = (end("--from", arguments.from, &ground)?, end("--to", to, &ground)?);
     let run = [0, 1, 2].map(|axis| to[axis] - from[axis]);
     let length_m = (run[0] * run[0] + run[1] * run[1]).sqrt();
@@ -201,7 +202,7 @@ fn kind_of(out: &Path) -> Result<Kind, Failure> {
 /// Every place around the eye.
 fn around(
     arguments: &Arguments,
-    area: &Area,
+    database: &Opened,
     range_m: f64,
     out: &Path,
     curvature: Curvature,
@@ -231,8 +232,8 @@ fn around(
         return Err(Failure::new(message, "ask for a larger --spacing or a smaller --range"));
     }
     files::check_writable(out)?;
-    let ground = places::ground_around(area, &[[east, north]], range_m)?;
-    let eye = viewshed.eye(&ground).ok_or_else(|| places::outside("--from", [east, north], area.frame()))?;
+    let ground = database.load(places::block_around(&database.area, &[[east, north]], range_m)?)?;
+    let eye = viewshed.eye(&ground).ok_or_else(|| places::outside("--from", [east, north], database.area.frame()))?;
     let looks = Looks { viewshed, ground: &ground, eye, workers: Workers::new(arguments.workers.count()) };
     let seen = match kind {
         Kind::Tiff => write_tiff(&looks, spacing, out)?,

@@ -21,7 +21,6 @@ use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 
 use super::body::{Bodies, Received};
-use super::contents::TileModulesFile;
 use super::files::{self, Part};
 use super::globe::{HOLES, Kind};
 use super::looks::{ObstacleAsked, ProfileAsked, ViewshedAsked};
@@ -30,6 +29,7 @@ use super::refusal::Refusal;
 use super::snapshot::{Served, Snapshot};
 use crate::arguments::row_col;
 use crate::commands::explain::to_json;
+use crate::contents::TileModulesFile;
 use crate::failure::Failure;
 use crate::resources;
 

@@ -12,8 +12,8 @@ use exports::{Datum, ExportError, Levels, Product, QuantizedMesh, Tileset, Work}
 use lru::LruCache;
 use schedule::Workers;
 
-use super::contents::Contents;
 use super::refusal::Refusal;
+use crate::contents::Contents;
 use crate::failure::Failure;
 use crate::resources;
 

@@ -7,8 +7,8 @@ use axum::http::StatusCode;
 use load_module_reader::{Area, Block, Keep, LoadedGround, ReadError, TileFile};
 use lru::LruCache;
 
-use super::contents::{Contents, TileModulesFile};
 use super::refusal::Refusal;
+use crate::contents::Contents;
 
 /// Load modules along a side of a block.
 const SIDE: u32 = 16;
@@ -155,11 +155,7 @@ fn load(of: &Contents, (level, row, col): Key) -> Result<LoadedGround, Refusal> 
         north: ((row + 1) * SIDE).min(of.frame.rows),
         east: ((col + 1) * SIDE).min(of.frame.cols),
     };
-    let touches = |file: &Block| {
-        file.south < block.north && block.south < file.north && file.west < block.east && block.west < file.east
-    };
-    let files: Vec<&TileModulesFile> = of.files.iter().filter(|file| touches(&file.block)).collect();
-    files.iter().try_for_each(|file| of.check(file)).map_err(Refusal::of)?;
+    let files = of.files_of(block).map_err(Refusal::of)?;
     let open = || {
         let files =
             files.iter().map(|file| TileFile::open(&file.path, Keep::OnDisk)).collect::<Result<_, ReadError>>()?;

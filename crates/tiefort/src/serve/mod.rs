@@ -15,7 +15,6 @@
 mod answers;
 mod body;
 mod connections;
-mod contents;
 pub mod files;
 mod globe;
 mod ground;

@@ -9,10 +9,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use exports::Datum;
 
-use super::contents::{Contents, FileLook, RECORD};
 use super::globe::Globes;
 use super::ground::Ground;
 use super::refusal::Refusal;
+use crate::contents::{Contents, FileLook, RECORD};
 use crate::failure::Failure;
 
 /// A database as one build left it.

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use axum::body::Bytes;
 use build::product::{Product, ProductGround, Wanted, WantedGround, water};
 use job::{Choice, Job};
-use load_module_reader::{Area, Keep};
+use load_module_reader::Area;
 use serde_json::json;
 use terrain::{HOLE_CLASS, ModuleGrid, ModuleRect, named_class_color};
 use views::{RESIDUAL_SCALE_M, palette};
@@ -14,6 +14,7 @@ use views::{RESIDUAL_SCALE_M, palette};
 use super::buildings::Buildings;
 use super::lines::Lines;
 use super::overview::Overview;
+use crate::contents::Opened;
 use crate::failure::Failure;
 
 /// The version of the format from which on load modules have lines.
@@ -54,7 +55,8 @@ impl Viewed {
         let first = ModuleRect { south: 0, west: 0, north: 1, east: 1 };
         let product = Product::read(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
         let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
-        let area = Area::open(folder, Keep::OnDisk).map_err(damaged)?;
+        let Opened { contents, area } = Opened::open(folder)?;
+        contents.files_of(area.whole())?;
         let waters = waters(&product.job);
         let mut overview = Overview::read(&area, &waters).map_err(damaged)?;
         let level = product.features.as_ref().map(|(level, _)| level);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use load_module_reader::{Area, Block, LoadedGround};
 use store::{BUILDING_UNITS_PER_METRE, Building, Folder, files};
 
-use crate::places::ground_around;
+use crate::places::block_around;
 use crate::terminal;
 
 /// Metres along a wall between two places where the ground is looked at.
@@ -64,7 +64,8 @@ impl Buildings {
         };
         let corners = [place(block.west, block.south), place(block.east - 1, block.north - 1)];
         // A building may reach into the next load module.
-        let ground = ground_around(area, &corners, 1.0).map_err(|failure| failure.message().to_owned())?;
+        let around = block_around(area, &corners, 1.0).map_err(|failure| failure.message().to_owned())?;
+        let ground = area.load(around).map_err(|error| error.to_string())?;
         let rows = self.0.range((block.south, 0)..(block.north, 0));
         let mut out = Vec::new();
         for (_, all) in rows.filter(|((_, col), _)| (block.west..block.east).contains(col)) {

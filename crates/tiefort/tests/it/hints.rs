@@ -165,7 +165,12 @@ fn a_plan_refuses_what_the_build_would_refuse_for_its_datum() {
     let scene = Scene::with_job("raster.toml", &[("sources = [\"dem.tif\"]", said)]);
     Raster::sound().write(&scene.path("dem.tif"));
     for command in ["plan", "build"] {
-        check(&scene, &[command, "job.toml"], &["job.toml:", ": dem.vertical_datum", "ellipsoid", "EGM96"], "name the grid");
+        check(
+            &scene,
+            &[command, "job.toml"],
+            &["job.toml:", ": dem.vertical_datum", "ellipsoid", "EGM96"],
+            "name the grid",
+        );
     }
 }
 

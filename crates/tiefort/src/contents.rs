@@ -1,11 +1,12 @@
-//! What a database holds, as its record and the headers of its files say.
+//! What a database holds, as its record and the headers of its files say; and its load modules, read from files that
+//! are those of the record.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
-use load_module_reader::{AreaFrame, Block, Keep, TileFile};
+use load_module_reader::{Area, AreaFrame, Block, Keep, LoadedGround, TileFile};
 use store::{FileStamp, Fingerprint, Folder, Manifest};
 use terrain::TileId;
 
@@ -38,7 +39,9 @@ impl FileLook {
 
 /// The file of a tile's load modules.
 pub struct TileModulesFile {
+    /// Which tile.
     pub tile: TileId,
+    /// Where it lies.
     pub path: PathBuf,
     /// The load modules in it.
     pub block: Block,
@@ -50,6 +53,7 @@ pub struct TileModulesFile {
 
 /// What a database holds.
 pub struct Contents {
+    /// Where it lies.
     pub folder: PathBuf,
     /// What `database.json` says.
     pub manifest: Manifest,
@@ -57,6 +61,7 @@ pub struct Contents {
     pub fingerprint: Fingerprint,
     /// Where load modules lie.
     pub frame: AreaFrame,
+    /// Its load-module files.
     pub files: Vec<TileModulesFile>,
 }
 
@@ -86,6 +91,19 @@ impl Contents {
         Ok(Self { folder: folder.to_path_buf(), manifest, fingerprint, frame, files })
     }
 
+    /// The files that hold load modules of a block, each the one of this build.
+    ///
+    /// # Errors
+    /// When one is missing, damaged or of another build.
+    pub fn files_of(&self, block: Block) -> Result<Vec<&TileModulesFile>, Failure> {
+        let touches = |file: &Block| {
+            file.south < block.north && block.south < file.north && file.west < block.east && block.west < file.east
+        };
+        let files: Vec<&TileModulesFile> = self.files.iter().filter(|file| touches(&file.block)).collect();
+        files.iter().try_for_each(|file| self.check(file))?;
+        Ok(files)
+    }
+
     /// Checks that a file is the one of this build, byte by byte unless it looks as it did when it was found to be.
     ///
     /// # Errors
@@ -104,6 +122,35 @@ impl Contents {
         }
         *sound = look;
         Ok(())
+    }
+}
+
+/// A finished database, of which load modules are taken as they are needed.
+pub struct Opened {
+    /// What it says of itself.
+    pub contents: Contents,
+    /// Load modules of its files; [`Contents::files_of`] says whether those are of this build.
+    pub area: Area,
+}
+
+impl Opened {
+    /// Opens the database in a folder.
+    ///
+    /// # Errors
+    /// When it is unfinished, damaged or missing.
+    pub fn open(folder: &Path) -> Result<Self, Failure> {
+        let contents = Contents::read(folder)?;
+        let area = Area::open(folder, Keep::OnDisk).map_err(|error| damaged(&error))?;
+        Ok(Self { contents, area })
+    }
+
+    /// The load modules of a block.
+    ///
+    /// # Errors
+    /// When a file is missing, damaged or of another build, or the block does not lie in the area.
+    pub fn load(&self, block: Block) -> Result<LoadedGround, Failure> {
+        self.contents.files_of(block)?;
+        self.area.load(block).map_err(|error| damaged(&error))
     }
 }
 
