@@ -1,7 +1,7 @@
 //! The features of a job on the lattice, which tile asks the DEM at which of their stations, and what it says there.
 
-use features::{AreaFeatures, Histogram, Kind, Outline, Place, Sounded};
-use job::Job;
+use features::{AreaFeatures, Histogram, Kind, Outline, Place, Site, Sounded};
+use job::{Job, OuterBorder};
 use store::Profile;
 use terrain::{Each, ModuleId, TileId};
 
@@ -50,8 +50,8 @@ impl ReadFeatures {
         let Some(spec) = &job.features else { return Ok(None) };
         let mut vectors = Vectors::read(job, area, each)?;
         let table = FeatureTable::of(&vectors, &spec.rules);
-        let features =
-            AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, spec.grade_give, site(area), each);
+        let site = Site { is_met: job.modules.outer_border == OuterBorder::Fixed, ..site(area) };
+        let features = AreaFeatures::of(std::mem::take(&mut vectors.sources), &spec.rules, spec.grade_give, site, each);
         let mut by_tile = vec![Vec::new(); area.tiles.len()];
         for (number, &place) in features.stations().iter().enumerate() {
             by_tile[area.tiling.index(tile_of(area, &features, place))].push(number as u32);

@@ -5,7 +5,8 @@
 use std::time::Instant;
 
 use features::{
-    FeatureId, GradeOptions, Network, Numbering, Position, Shape, Site, Source, grade, mend, round, sides, sort_out,
+    Below, FeatureId, GradeOptions, Network, Numbering, Position, Shape, Site, Source, grade, mend, round, sides,
+    sort_out,
 };
 use terrain::{Post, PostRect, Spacing, in_turn};
 
@@ -73,7 +74,7 @@ fn main() {
     };
     let ground: Vec<Option<i32>> = network.nodes.iter().map(|node| ground(node.place)).collect();
     lap("ground");
-    let heights = grade(&network, [&ground; 2], &[], &[], GradeOptions::USUAL, &mut remarks);
+    let heights = grade(&network, [&ground; 2], &[], Below::WAYS, GradeOptions::USUAL, &mut remarks);
     lap("grade");
     let moved = heights.iter().zip(&ground).filter(|(height, ground)| Some(**height) != **ground).count();
     let stations = network.nodes.len();

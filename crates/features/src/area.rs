@@ -13,10 +13,11 @@ use crate::roadsides::roadsides;
 use crate::rules::Sorted;
 use crate::watersides::{Watersides, watersides};
 use crate::{
-    About, Bed, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Kind, Lake, Network,
-    Outline, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters, Way, afloat, banks,
-    breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores, lines_inside, mend,
-    outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water, with_water,
+    About, Bed, Below, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Kind, Lake,
+    Network, Node, Outline, Pin, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters,
+    Way, afloat, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores,
+    lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water,
+    with_water,
 };
 
 /// Features on the lattice of an area, before their heights are known.
@@ -90,6 +91,7 @@ impl AreaFeatures {
         };
         let Self { site, ways, outlines, .. } = self;
         word(site.lattice.steps_per_post().into());
+        word(site.is_met.into());
         word(ways.len() as i64);
         for Way { traits, places, heights, id } in ways {
             traits.feed(word);
@@ -197,7 +199,8 @@ impl AreaFeatures {
         let beside = beside.chain(self.deck_sides.places());
         let shores = self.outlines.iter().flat_map(Outline::places);
         let lines = self.lines.iter().flat_map(|line| &line.stations).map(|(place, _)| *place);
-        let mut all: Vec<Place> = nodes.chain(beside).chain(shores).chain(lines).collect();
+        let border = nodes.clone().filter_map(|place| self.site.along_border(place)).flatten();
+        let mut all: Vec<Place> = nodes.chain(border).chain(beside).chain(shores).chain(lines).collect();
         all.sort_unstable();
         all.dedup();
         all
@@ -237,12 +240,15 @@ impl AreaFeatures {
         let resting = ground_of(&self.roads, &|place| middle(place).and(at(place)), &near);
         let mut hills = under_hills(&self.roads, &resting, options.cut_max);
         let roads = &*self.roads.with_tunnels(&hills);
-        let afloat = afloat(&self.outlines, &lakes, roads, &self.road_sides, &self.site);
+        let afloat = afloat(&self.outlines, &self.known(&lakes, inside), roads, &self.road_sides, &self.site);
         let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
+        // One that cannot be kept is none to tell: no border has to be met.
+        let pins = with_water(roads, pins, &self.met(roads, &natural, middle_of), &mut Vec::new());
         let amid = middles_of(roads, &middle, &resting);
-        let mut below = water(&strands);
-        below.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
-        let heights = grade(roads, [&resting, &amid], &pins, &below, options, &mut remarks);
+        let mut water = water(&strands);
+        water.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
+        let below = Below { water: &water, is_known: &|place| self.site.holds(place) };
+        let heights = grade(roads, [&resting, &amid], &pins, below, options, &mut remarks);
         let left = still_under(roads, &heights, (&self.deck_sides, &at), options.cut_max);
         let roads = &*roads.with_tunnels(&left);
         hills.extend(left);
@@ -302,9 +308,10 @@ impl AreaFeatures {
         };
         let lower_bank: Vec<Option<i32>> = self.river_banks.iter().zip(&ground).map(lowest).collect();
         let middles = middles_of(rivers, middle, &ground);
-        let still = lakes_along(outlines, &waters.lakes, rivers, site);
+        let still = lakes_along(outlines, &self.known(&waters.lakes, inside), rivers, site);
         let bed = Bed { ground: &ground, middle: &middles, lower_bank: &lower_bank };
-        let fallen = fall(rivers, bed, &still, falls, remarks);
+        let lowest = |[here, before, after, ..]: [i32; 5]| here.min(before).min(after);
+        let fallen = fall(rivers, bed, &still, &self.met(rivers, at, lowest), falls, remarks);
         let levels: HashMap<u32, i32> =
             still.iter().zip(&fallen.levels).map(|(still, level)| (still.body, *level)).collect();
         waters.lakes.iter_mut().for_each(|lake| lake.level = levels.get(&lake.body).copied().unwrap_or(lake.level));
@@ -321,6 +328,29 @@ impl AreaFeatures {
         strands.extend(waters.outlines_only.iter().flat_map(only));
         let level = rivers.nodes.iter().zip(&fallen.is_level).filter(|(_, is_level)| **is_level);
         Watered { strands, lakes: waters.lakes, level: level.map(|(node, _)| node.place).collect() }
+    }
+
+    /// The heights at which ways on the ground cross a border that others meet: of those of the ground along it.
+    fn met(&self, network: &Network, at: Ground, of: impl Fn([i32; 5]) -> i32) -> Vec<Pin> {
+        let on_ground = (0..).zip(&network.nodes).filter(|(_, node)| node.on_ground);
+        let pin = |(node, of_node): (u32, &Node)| {
+            let along = self.site.along_border(of_node.place)?;
+            let here = at(of_node.place)?;
+            Some(Pin { node, height: of(along.map(|place| at(place).unwrap_or(here))) })
+        };
+        on_ground.filter_map(pin).collect()
+    }
+
+    /// The lakes that lie in the area, if only in part, or whose level is given. How high others lie is a guess, which
+    /// nothing has to follow.
+    fn known(&self, lakes: &[Lake], inside: &[Histogram]) -> Vec<Lake> {
+        let is_known = |lake: &&Lake| {
+            let outline = lake.outline as usize;
+            lake.is_fixed
+                || !inside[outline].is_empty()
+                || self.outlines[outline].places().any(|place| self.site.holds(place))
+        };
+        lakes.iter().filter(is_known).cloned().collect()
     }
 
     /// Breaklines at the heights of their source, else of the ground.
@@ -367,6 +397,12 @@ fn ground_of(network: &Network, at: Ground, near: Ground) -> Vec<Option<i32>> {
     let mut ground: Vec<Option<i32>> = network.nodes.iter().map(|node| at(node.place)).collect();
     network.give_heights(&mut ground, &|node| near(place(node)));
     ground
+}
+
+/// The middle one of heights.
+fn middle_of(mut heights: [i32; 5]) -> i32 {
+    heights.sort_unstable();
+    heights[2]
 }
 
 /// The middle one of nine heights around each node of a network, else its ground.
@@ -436,6 +472,76 @@ mod tests {
         let mut other = sources();
         other.reverse();
         assert_eq!(levelled(sources(), hills), levelled(other, hills));
+    }
+
+    /// Heights in metres of what features put into the ground within a post of a place.
+    fn around(levelled: &Levelled, [east, north]: [f64; 2]) -> Vec<f64> {
+        let near = |place: Place| {
+            let [x, y] = site().lattice.posts_of(place);
+            (x - east).abs() <= 1.0 && (y - north).abs() <= 1.0
+        };
+        let points = &levelled.reserved.formed.points;
+        points.iter().filter(|point| near(point.0)).map(|point| terrain::metres_of_quanta(point.1)).collect()
+    }
+
+    #[test]
+    fn a_bridge_beyond_the_border_lifts_nothing_inside() {
+        let sources = vec![
+            way(1, "highway=primary", &[(300.0, 190.0), (404.0, 190.0), (404.0, 196.0)]),
+            way(2, "highway=primary bridge=yes", &[(404.0, 196.0), (404.0, 204.0)]),
+            way(3, "highway=primary", &[(404.0, 204.0), (404.0, 230.0)]),
+            way(4, "highway=primary", &[(300.0, 200.0), (449.0, 200.0)]),
+        ];
+        let all = levelled(sources, |_, north| if north < 195.0 { 0.0 } else { 90.0 });
+        let found = around(&all, [400.0, 190.0]);
+        assert!(!found.is_empty() && found.iter().all(|height| height.abs() < 1.0), "{found:?}");
+    }
+
+    #[test]
+    fn which_way_a_river_flows_is_asked_of_the_ground_there_is() {
+        let sources = vec![
+            way(1, "waterway=stream", &[(380.0, 100.0), (420.0, 100.0), (420.0, 140.0), (420.0, 240.0)]),
+            way(2, "waterway=stream", &[(380.0, 140.0), (420.0, 140.0)]),
+            way(3, "waterway=stream", &[(380.0, 200.0), (420.0, 200.0), (420.0, 240.0)]),
+        ];
+        let slope = |from: f64, east: f64| from - (east - 380.0) / 4.0;
+        let all = levelled(sources, |east, north| match north as i32 {
+            ..120 => slope(50.0, east),
+            120..170 => slope(25.0, east),
+            _ => slope(90.0, east),
+        });
+        let found = around(&all, [400.0, 140.0]);
+        assert!(!found.is_empty() && found.iter().all(|height| *height < 26.0), "{found:?}");
+    }
+
+    #[test]
+    fn features_cross_a_border_that_others_meet_at_heights_that_both_know() {
+        let sources = || {
+            vec![
+                way(1, "highway=primary", &[(300.0, 100.0), (440.0, 100.0)]),
+                way(2, "waterway=stream", &[(300.0, 200.0), (440.0, 200.0)]),
+            ]
+        };
+        let ground = |east: f64, north: f64| 1000.0 - east + (east * 1.7).sin() * 4.0 + (north * 2.3).cos();
+        let heights = |is_met: bool| {
+            let all = AreaFeatures::of(sources(), &[], 1.5, Site { is_met, ..site() }, &in_turn);
+            let heights: Vec<Option<i32>> = all.stations().iter().map(|place| ground_at(*place, &ground)).collect();
+            let levelled = level_usual(&all, &heights, &Shares::each([8, 8], 1000));
+            let on_border = |north: f64| {
+                let place = site().lattice.place_of([400.0, north]).unwrap();
+                let points = &levelled.reserved.formed.points;
+                terrain::metres_of_quanta(points.iter().find(|point| point.0 == place).unwrap().1)
+            };
+            [100.0, 200.0].map(on_border)
+        };
+        let along = |north: f64, asides: &[f64]| -> Vec<f64> {
+            let mut found: Vec<f64> = asides.iter().map(|aside| ground(400.0, north + aside)).collect();
+            found.sort_by(f64::total_cmp);
+            found
+        };
+        let expected = [along(100.0, &[-2.0, -1.0, 0.0, 1.0, 2.0])[2], along(200.0, &[-1.0, 0.0, 1.0])[0]];
+        let is_near = |found: [f64; 2]| [0, 1].map(|at| (found[at] - expected[at]).abs() < 0.02);
+        assert_eq!((is_near(heights(true)), is_near(heights(false))), ([true; 2], [false; 2]), "{expected:?}");
     }
 
     #[test]

@@ -7,10 +7,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::decks::{Clearances, Water, raise_sagging_ends, straighten};
+use crate::decks::{Clearances, raise_sagging_ends, straighten};
 use crate::fit::{Problem, Tie, fit};
 use crate::forest::{Range, Sample};
-use crate::passing::clear;
+use crate::passing::{Below, clear};
 use crate::smooth::{filled, smooth};
 use crate::sweep::{Pin, Swept, bounds, one_a_node, relax_between_pins, relax_within, remark_steep};
 use crate::{Network, Remark, Way};
@@ -58,12 +58,12 @@ impl GradeOptions {
 /// A height in quanta for every node of a network of ways that are travelled.
 ///
 /// `ground` is the DEM at every node and `middle` the middle of its heights around it, from which limits of cut and
-/// fill are counted (`None` without one there); `pins` are hard, and decks keep clear of `water`.
+/// fill are counted (`None` without one there); `pins` are hard, and decks keep clear of what lies `below`.
 pub fn grade(
     network: &Network,
     [ground, middle]: [&[Option<i32>]; 2],
     pins: &[Pin],
-    water: &[Water],
+    below: Below,
     options: GradeOptions,
     remarks: &mut Vec<Remark>,
 ) -> Vec<i32> {
@@ -78,7 +78,7 @@ pub fn grade(
     let pins = one_a_node(network, pins, remarks);
     let mut swept = lay(network, [&resting, middle], &pins, options);
     straighten(network, &swept.costs, &mut swept.heights);
-    clear(network, &mut swept, ground, water, options.clearances, remarks);
+    clear(network, &mut swept, ground, below, options.clearances, remarks);
     remark_steep(network, &swept.heights, &|edge| network.relaxed_max(edge), remarks);
     Remark::sort(remarks);
     swept.heights
@@ -197,7 +197,7 @@ mod tests {
     #[track_caller]
     fn heights(sources: Vec<Source>, ground: impl Fn(f64, f64) -> f64) -> (Network, Vec<i32>, Vec<Remark>) {
         let (network, ground, mut remarks) = network(sources, ground);
-        let heights = grade(&network, [&ground; 2], &[], &[], GradeOptions::USUAL, &mut remarks);
+        let heights = grade(&network, [&ground; 2], &[], Below::WAYS, GradeOptions::USUAL, &mut remarks);
         for edge in &network.edges {
             let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
             assert!(rise <= edge.rise_max, "a grade is exceeded");
@@ -306,7 +306,8 @@ mod tests {
         let place = network.lattice.place_of([40.0, 20.0]).unwrap();
         let node = network.nodes.iter().position(|node| node.place == place).unwrap() as u32;
         let pins = [Pin { node, height: 1280 }, Pin { node: node + 1, height: 1280 }];
-        let height = grade(&network, [&ground; 2], &pins[..1], &[], GradeOptions::USUAL, &mut remarks)[node as usize];
+        let height =
+            grade(&network, [&ground; 2], &pins[..1], Below::WAYS, GradeOptions::USUAL, &mut remarks)[node as usize];
         assert_eq!(height, 1280);
         // The other end went up alone, four times, so fifteen sixteenths of the clearance are there.
         assert!(
@@ -319,7 +320,7 @@ mod tests {
     fn two_pins_on_one_junction_that_disagree_are_written_down() {
         let (network, ground, mut remarks) = network(bridge("highway=primary"), |_, _| 10.0);
         let pins = [Pin { node: 10, height: 1000 }, Pin { node: 10, height: 2000 }];
-        let found = grade(&network, [&ground; 2], &pins, &[], GradeOptions::USUAL, &mut remarks);
+        let found = grade(&network, [&ground; 2], &pins, Below::WAYS, GradeOptions::USUAL, &mut remarks);
         assert_eq!(found[10], 1000);
         assert_eq!(remarks[0].flaw, Flaw::PinsDisagree);
     }
@@ -328,7 +329,7 @@ mod tests {
     fn pins_too_steep_for_the_grade_exceed_it_between_them_and_it_is_written_down() {
         let (network, ground, mut remarks) = network(bridge("highway=primary"), |_, _| 10.0);
         let pins = [Pin { node: 10, height: 0 }, Pin { node: 14, height: 2560 }];
-        let found = grade(&network, [&ground; 2], &pins, &[], GradeOptions::USUAL, &mut remarks);
+        let found = grade(&network, [&ground; 2], &pins, Below::WAYS, GradeOptions::USUAL, &mut remarks);
         assert_eq!((found[10], found[14]), (0, 2560));
         assert!(matches!(remarks[0].flaw, Flaw::PinsTooSteep { grade_ppm } if 500_000 <= grade_ppm));
     }

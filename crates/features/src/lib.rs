@@ -12,8 +12,8 @@
 //! split_at_dams(rounded.outlines, &rounded.ways) -> Vec<Outline>
 //! Network::of(&travelled(&rounded), ..), Network::of(&flowing(&rounded), ..)
 //! level(&outlines, &shores, ..) -> Waters           lakes; then lakes_along(..) -> Vec<Still> for the rivers
-//! fall(&rivers, Bed, &still, ..) -> Fallen                  rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
-//! grade(&roads, [&ground, &middle], &pins, &water(&strands), GradeOptions, ..) -> Vec<i32>
+//! fall(&rivers, Bed, &still, &pins, ..) -> Fallen           rivers; channels(..), shore(..), banks(..) -> Vec<Strand>
+//! grade(&roads, [&ground, &middle], &pins, Below { water: &water(&strands), .. }, GradeOptions, ..) -> Vec<i32>
 //! reserve(&Graded, &strands, &Site, &Shares, about) -> Reserved
 //!     .formed: Formed { points, edges, faces, decks, middles, remarks }, .cost: triangles by load module and class
 //! ```
@@ -77,6 +77,7 @@ pub use aground::DECK_GAP;
 mod decks;
 mod passing;
 pub use decks::{Clearances, Water};
+pub use passing::Below;
 mod grade;
 pub use grade::{GradeOptions, grade, pins};
 mod flow;

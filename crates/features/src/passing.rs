@@ -42,13 +42,28 @@ struct Lack {
 /// A corner of an area, in steps east and north.
 type Corner = [f64; 2];
 
+/// What decks keep clear of beside the ways of their own network.
+#[derive(Clone, Copy)]
+pub struct Below<'a> {
+    /// Water, at its heights.
+    pub water: &'a [Water],
+    /// Whether there is ground at a place. Beyond the area ways keep the heights at which they leave it, however it
+    /// goes on, so nothing is known there of what lies above what.
+    pub is_known: &'a dyn Fn(Place) -> bool,
+}
+
+impl Below<'_> {
+    /// Ways alone, with ground everywhere.
+    pub const WAYS: Self = Self { water: &[], is_known: &|_| true };
+}
+
 /// Raises decks clear of what they cross as far as the grade allows; what is left is written down. A tunnel counts as
 /// no higher than the `ground` over it, whatever its ends ask for.
 pub(crate) fn clear(
     network: &Network,
     swept: &mut Swept,
     ground: &[Option<i32>],
-    water: &[Water],
+    below: Below,
     clearances: Clearances,
     remarks: &mut Vec<Remark>,
 ) {
@@ -56,11 +71,11 @@ pub(crate) fn clear(
     if !decks.iter().any(|passage| passage.is_deck) {
         return;
     }
-    let mut overs = overs(network, &decks, water);
+    let mut overs = overs(network, &decks, below.water);
     // A round more for decks whose road below was raised with them.
     for _ in 0..CLEAR_ROUNDS {
         let lacks =
-            lacks(network, [&swept.heights, &beneath(network, &swept.heights, ground)], &overs, water, clearances);
+            lacks(network, [&swept.heights, &beneath(network, &swept.heights, ground)], &overs, below, clearances);
         if lacks.is_empty() {
             break;
         }
@@ -79,10 +94,10 @@ pub(crate) fn clear(
         straighten(network, &swept.costs, &mut swept.heights);
     }
     // The ground may be cut away, or bored through.
-    let belows = Belows { network, water };
+    let belows = Belows { network, water: below.water };
     overs.retain(|over| belows.kind(over.below) != Kind::Breakline);
     let heights = [&swept.heights[..], &beneath(network, &swept.heights, ground)];
-    for Lack { edge, lack, place, .. } in lacks(network, heights, &overs, water, clearances) {
+    for Lack { edge, lack, place, .. } in lacks(network, heights, &overs, below, clearances) {
         let id = network.ways[network.edges[edge as usize].way as usize].id;
         let flaw = Flaw::ClearanceLacks { quanta: lack };
         Notes { id, lattice: network.lattice, remarks }.write_at(place, flaw, Remedy::LeftAsItIs);
@@ -129,10 +144,10 @@ fn lacks(
     network: &Network,
     [heights, beneath]: [&[i32]; 2],
     overs: &[Over],
-    water: &[Water],
+    below: Below,
     clearances: Clearances,
 ) -> Vec<Lack> {
-    let belows = Belows { network, water };
+    let belows = Belows { network, water: below.water };
     let mut worst: BTreeMap<(u32, u64), Lack> = BTreeMap::new();
     for over in overs {
         let clearance = if over.passes { clearances.over(belows.kind(over.below)) } else { 0 };
@@ -142,11 +157,9 @@ fn lacks(
             let below = belows.height(beneath, over.below, place);
             Lack { passage: over.passage, edge: over.edge, lack: below + clearance - deck, place }
         };
-        let Some(found) =
-            belows.common(over.edge, over.below).iter().map(lack).max_by_key(|lack| (lack.lack, lack.place))
-        else {
-            continue;
-        };
+        let common = belows.common(over.edge, over.below);
+        let known = common.iter().map(lack).filter(|lack| (below.is_known)(lack.place));
+        let Some(found) = known.max_by_key(|lack| (lack.lack, lack.place)) else { continue };
         if 0 < found.lack {
             let of = worst.entry((over.passage, belows.feature(over.below))).or_insert(found);
             *of = if of.lack < found.lack { found } else { *of };
@@ -352,13 +365,13 @@ mod tests {
             way(4, "railway=rail", &[(30.0, 16.0), (70.0, 24.0)]),
         ];
         let (network, ground, mut remarks) = network(sources, |east, _| 10.0 + east * 0.25);
-        let heights = grade(&network, [&ground, &ground], &[], &[], GradeOptions::USUAL, &mut remarks);
+        let heights = grade(&network, [&ground, &ground], &[], Below::WAYS, GradeOptions::USUAL, &mut remarks);
         let decks = passages(&network);
         let found = overs(&network, &decks, &[]);
         assert!(found.iter().any(|over| over.passes) && 2 < found.len());
-        assert_eq!(lacks(&network, [&heights; 2], &found, &[], Clearances::USUAL), []);
+        assert_eq!(lacks(&network, [&heights; 2], &found, Below::WAYS, Clearances::USUAL), []);
         let raised = Clearances { rail: Clearances::USUAL.rail + 16, ..Clearances::USUAL };
-        assert_eq!(lacks(&network, [&heights; 2], &found, &[], raised).len(), 1, "no higher than it has to be");
+        assert_eq!(lacks(&network, [&heights; 2], &found, Below::WAYS, raised).len(), 1, "no higher than it has to be");
     }
 
     #[test]

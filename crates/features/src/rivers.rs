@@ -14,6 +14,7 @@ use crate::flow::Flow;
 use crate::forest::{Range, Sample, UNBOUNDED};
 use crate::grade::samples_of;
 use crate::smooth::filled;
+use crate::sweep::Pin;
 use crate::{FeatureId, Flaw, Kind, Network, Numbering, Place, Remark, Remedy};
 
 /// Rounds in which loops of rivers are fitted.
@@ -92,10 +93,18 @@ pub struct Still {
     pub nodes: Vec<u32>,
 }
 
-/// Lets a network fall: no edge rises by a quantum, a circle lies level, and all nodes of a lake have its level.
-pub fn fall(network: &Network, bed: Bed, still: &[Still], options: FallOptions, remarks: &mut Vec<Remark>) -> Fallen {
+/// Lets a network fall: no edge rises by a quantum, a circle lies level, and all nodes of a lake have its level. Nodes
+/// that lie in none have the heights of their `pins`, or that of a lower one upstream.
+pub fn fall(
+    network: &Network,
+    bed: Bed,
+    still: &[Still],
+    pins: &[Pin],
+    options: FallOptions,
+    remarks: &mut Vec<Remark>,
+) -> Fallen {
     let ground = filled(network, bed.ground);
-    let turned = orient(network, &ground, remarks);
+    let turned = orient(network, bed.ground, remarks);
     let directed: Vec<(u32, u32)> = network
         .edges
         .iter()
@@ -108,10 +117,14 @@ pub fn fall(network: &Network, bed: Bed, still: &[Still], options: FallOptions, 
     groups.iter().filter(|group| 1 < group.len()).flatten().for_each(|node| is_level[*node as usize] = true);
     still.iter().flat_map(|still| &still.nodes).for_each(|node| is_level[*node as usize] = true);
 
-    let mut falls = Falls::new(network, &directed, &groups, still, bed);
+    let is_free = |pin: &&Pin| still.iter().all(|still| !still.nodes.contains(&pin.node));
+    let pins: Vec<Pin> = pins.iter().filter(is_free).copied().collect();
+    let mut falls = Falls::new(network, &directed, &groups, (still, &pins), bed);
     let fitted = falls.fit_to_ground(&ground, options);
     let carved = falls.carve(&fitted, options.carve_max);
-    let heights = if options.tilt { falls.tilt(carved, &is_level) } else { carved };
+    let mut stays = is_level.clone();
+    pins.iter().for_each(|pin| stays[pin.node as usize] = true);
+    let heights = if options.tilt { falls.tilt(carved, &stays) } else { carved };
     let (heights, levels) = heights.split_at(network.nodes.len());
     let whole = |heights: &[i64]| heights.iter().map(|height| *height as i32).collect::<Vec<i32>>();
     let fallen = Fallen { heights: whole(heights), turned, levels: whole(levels), is_level };
@@ -124,6 +137,7 @@ pub fn fall(network: &Network, bed: Bed, still: &[Still], options: FallOptions, 
 struct Falls<'a> {
     network: &'a Network,
     still: &'a [Still],
+    pins: &'a [Pin],
     bed: Bed<'a>,
     problem: Problem,
     /// The ground at nodes whose height is not that of a lake, where it is known.
@@ -135,7 +149,7 @@ impl<'a> Falls<'a> {
         network: &'a Network,
         directed: &[(u32, u32)],
         groups: &[Vec<u32>],
-        still: &'a [Still],
+        (still, pins): (&'a [Still], &'a [Pin]),
         bed: Bed<'a>,
     ) -> Self {
         let mut group_of = vec![0u32; network.nodes.len()];
@@ -155,7 +169,7 @@ impl<'a> Falls<'a> {
         let places = network.nodes.iter().map(|node| node.place).chain(still.iter().map(|still| still.place)).collect();
         let ranges = vec![Range::ALL; network.nodes.len() + still.len()];
         let problem = Problem { places, ties, ranges, ..Problem::default() };
-        Self { network, still, bed, problem, own }
+        Self { network, still, pins, bed, problem, own }
     }
 
     fn fit_to_ground(&mut self, ground: &[i32], options: FallOptions) -> Vec<i64> {
@@ -175,20 +189,21 @@ impl<'a> Falls<'a> {
         let levels = self.still.iter().map(|still| i64::from(still.level));
         self.problem.wishes = ground.iter().map(|height| i64::from(*height)).chain(levels).collect();
         self.problem.samples = samples;
-        self.fix_levels();
+        self.fix();
         fit(&self.problem, ROUNDS)
     }
 
-    /// Holds levels that sources give. Where two contradict the fall, the upper one stays.
-    fn fix_levels(&mut self) {
-        let count = self.network.nodes.len();
-        let fixed = self.still.iter().enumerate().filter(|(_, still)| still.is_fixed);
+    /// Holds levels that sources give, and pins. Where two contradict the fall, the upper one stays.
+    fn fix(&mut self) {
+        let levels = (self.network.nodes.len()..).zip(self.still).filter(|(_, still)| still.is_fixed);
+        let levels = levels.map(|(node, still)| (node, i64::from(still.level)));
+        let fixed = self.pins.iter().map(|pin| (pin.node as usize, i64::from(pin.height))).chain(levels);
         let mut most = Problem { ranges: vec![Range::ALL; self.problem.places.len()], ..self.problem.clone() };
-        fixed.clone().for_each(|(number, still)| most.ranges[count + number].most = still.level.into());
+        fixed.clone().for_each(|(node, height)| most.ranges[node].most = height.min(most.ranges[node].most));
         let most = crate::fit::most(&most);
-        for (number, still) in fixed {
-            let level = most[count + number].min(still.level.into());
-            self.problem.ranges[count + number] = Range { least: level, most: level };
+        for (node, height) in fixed {
+            let height = most[node].min(height);
+            self.problem.ranges[node] = Range { least: height, most: height };
         }
     }
 
@@ -205,15 +220,24 @@ impl<'a> Falls<'a> {
             let least = if node < network.nodes.len() { -UNBOUNDED } else { *height };
             self.problem.ranges[node] = Range { least, most: *height };
         }
+        self.hold_pins(fitted);
         let wishes = keys.iter().zip(fitted).map(|(key, fitted)| key.map_or(*fitted, i64::from));
         self.problem.wishes = wishes.chain(fitted[network.nodes.len()..].iter().copied()).collect();
         fit(&self.problem, ROUNDS)
+    }
+
+    /// Keeps pinned nodes at their heights.
+    fn hold_pins(&mut self, heights: &[i64]) {
+        for node in self.pins.iter().map(|pin| pin.node as usize) {
+            self.problem.ranges[node] = Range { least: heights[node], most: heights[node] };
+        }
     }
 
     fn tilt(&mut self, mut heights: Vec<i64>, is_level: &[bool]) -> Vec<i64> {
         let count = self.network.nodes.len();
         tilt(self.network, &mut heights[..count], is_level);
         self.problem.ranges[..count].fill(Range::ALL);
+        self.hold_pins(&heights);
         keep_ties(&self.problem, heights)
     }
 }
@@ -262,8 +286,9 @@ fn remark_moved(network: &Network, still: &[Still], levels: &[i64], remarks: &mu
 const SAVED_MIN: i64 = terrain::QUANTA_PER_METRE as i64;
 
 /// Which edges flow against the direction of their way. A way is turned round when the sum of distances between its
-/// ground and the nearest profile that falls is halved by that, and well beyond noise.
-fn orient(network: &Network, ground: &[i32], remarks: &mut Vec<Remark>) -> Vec<bool> {
+/// ground and the nearest profile that falls is halved by that, and well beyond noise. Where there is no ground, as
+/// beyond the area, nothing speaks for either.
+fn orient(network: &Network, ground: &[Option<i32>], remarks: &mut Vec<Remark>) -> Vec<bool> {
     let mut turned = vec![false; network.edges.len()];
     let mut first = 0;
     for edges in network.edges.chunk_by(|a, b| a.way == b.way) {
@@ -273,10 +298,11 @@ fn orient(network: &Network, ground: &[i32], remarks: &mut Vec<Remark>) -> Vec<b
             // A closed way has no lower end.
             continue;
         }
-        let mut along: Vec<i32> = vec![ground[edges[0].a as usize]];
-        along.extend(edges.iter().map(|edge| ground[edge.b as usize]));
+        let nodes = [edges[0].a].into_iter().chain(edges.iter().map(|edge| edge.b));
+        let along: Vec<i32> = nodes.filter_map(|node| ground[node as usize]).collect();
+        let (Some(first_known), Some(last_known)) = (along.first(), along.last()) else { continue };
         let id = network.ways[edges[0].way as usize].id;
-        let uphill = along[0] < along[along.len() - 1];
+        let uphill = first_known < last_known;
         let drawn_downhill = id.numbering != Numbering::Row;
         let forth = cost_of_falling(along.iter().copied());
         let back = cost_of_falling(along.iter().rev().copied());
@@ -388,7 +414,7 @@ mod tests {
         };
         let still: Vec<Still> = (0..).zip(levels).map(still).collect();
         let mut remarks = Vec::new();
-        let fallen = fall(network, bed, &still, FallOptions::USUAL, &mut remarks);
+        let fallen = fall(network, bed, &still, &[], FallOptions::USUAL, &mut remarks);
         for (edge, turned) in network.edges.iter().zip(&fallen.turned) {
             let (from, to) = if *turned { (edge.b, edge.a) } else { (edge.a, edge.b) };
             assert!(fallen.heights[to as usize] <= fallen.heights[from as usize], "an edge rises");
@@ -430,7 +456,7 @@ mod tests {
         assert!(inside.windows(2).all(|pair| pair[1] < pair[0]), "{inside:?}");
         let level = FallOptions { tilt: false, ..FallOptions::USUAL };
         let bed = Bed { ground: &ground, middle: &ground, lower_bank: &ground };
-        let fallen = fall(&network, bed, &[], level, &mut Vec::new());
+        let fallen = fall(&network, bed, &[], &[], level, &mut Vec::new());
         assert_eq!(fallen.heights, ground.into_iter().flatten().collect::<Vec<_>>());
     }
 

@@ -5,9 +5,9 @@ use terrain::{Post, PostRect, Spacing, in_turn};
 use crate::exact::Segment;
 use crate::forms::{Scope, form};
 use crate::{
-    AreaFeatures, FallOptions, FeatureId, Form, Formed, FormedEdge, GradeOptions, Graded, Grants, Levelled, Network,
-    Numbering, Place, Position, Remark, Role, Rounded, Shape, Shares, Site, Sounded, Source, Strand, Way, grade, mend,
-    round, sides, sort_out, touch_at_vertices_only,
+    AreaFeatures, Below, FallOptions, FeatureId, Form, Formed, FormedEdge, GradeOptions, Graded, Grants, Levelled,
+    Network, Numbering, Place, Position, Remark, Role, Rounded, Shape, Shares, Site, Sounded, Source, Strand, Way,
+    grade, mend, round, sides, sort_out, touch_at_vertices_only,
 };
 
 /// An area of 400 x 400 posts of 10 m, load modules of 50 posts, tiles of 200.
@@ -82,7 +82,7 @@ pub fn formed_between(rounded: Rounded, metres: impl Fn(f64, f64) -> f64, betwee
     let (travelled, flowing): (Vec<Way>, Vec<Way>) = ways.into_iter().partition(|way| way.traits.kind.is_travelled());
     let network = Network::of(&travelled, site().lattice, &mut remarks);
     let ground: Vec<Option<i32>> = network.nodes.iter().map(|node| ground_at(node.place, &metres)).collect();
-    let heights = grade(&network, [&ground; 2], &[], &[], GradeOptions::USUAL, &mut remarks);
+    let heights = grade(&network, [&ground; 2], &[], Below::WAYS, GradeOptions::USUAL, &mut remarks);
     let beside: Vec<[i32; 2]> =
         sides(&network).iter().map(|sides| sides.map(|place| ground_at(place, &metres).unwrap_or(0))).collect();
     let strand = |way: &Way| Strand {

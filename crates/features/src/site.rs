@@ -17,6 +17,9 @@ pub struct Site {
     pub module_posts: i32,
     /// Posts from one tile line to the next.
     pub tile_posts: i32,
+    /// Whether other areas may be built that meet this one: where features cross its border they have heights that
+    /// both know.
+    pub is_met: bool,
 }
 
 impl Site {
@@ -27,7 +30,7 @@ impl Site {
         let [south, west, north, east] =
             [area.south, area.west, area.north, area.east].map(|posts| posts * lattice.steps_per_post());
         let extent = Extent { south_west: Place::new(south, west), north_east: Place::new(north, east) };
-        Self { lattice, extent, module_posts, tile_posts }
+        Self { lattice, extent, module_posts, tile_posts, is_met: false }
     }
 
     /// Whether the middle between two places lies in the area or on its border.
@@ -49,6 +52,23 @@ impl Site {
         let Extent { south_west, north_east } = self.extent;
         let inside = |at: i32, low: i32, high: i32| low + margin < at && at < high - margin;
         !(inside(place.row, south_west.row, north_east.row) && inside(place.col, south_west.col, north_east.col))
+    }
+
+    /// Where the ground is asked for the height of a feature at a place on a border that others meet: there, and at two
+    /// posts to either side along the border, of which the next one to either side come first. None elsewhere.
+    pub(crate) fn along_border(&self, place: Place) -> Option<[Place; 5]> {
+        let margin = self.module_posts * self.lattice.steps_per_post();
+        let Extent { south_west, north_east } = self.extent;
+        let is_end = |at: i32, low: i32, high: i32| at == low + margin || at == high - margin;
+        let crosses_rows = is_end(place.row, south_west.row, north_east.row);
+        let is_on =
+            self.is_met && self.holds(place) && (crosses_rows || is_end(place.col, south_west.col, north_east.col));
+        let post = self.lattice.steps_per_post();
+        let aside = |by: i32| match crosses_rows {
+            true => Place::new(place.row, place.col + by * post),
+            false => Place::new(place.row + by * post, place.col),
+        };
+        is_on.then(|| [0, -1, 1, -2, 2].map(aside))
     }
 
     /// Steps between load-module lines and between tile lines.

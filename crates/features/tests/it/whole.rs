@@ -50,7 +50,7 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     let still = lakes_along(&rounded.outlines, &waters.lakes, &rivers, &site);
     let bed: Vec<Option<i32>> = rivers.nodes.iter().map(|node| dem(node.place)).collect();
     let of_bed = Bed { ground: &bed, middle: &bed, lower_bank: &bed };
-    let fallen = fall(&rivers, of_bed, &still, falls, &mut remarks);
+    let fallen = fall(&rivers, of_bed, &still, &[], falls, &mut remarks);
     for (still, level) in still.iter().zip(&fallen.levels) {
         let of_body = waters.lakes.iter_mut().filter(|lake| lake.body == still.body);
         of_body.for_each(|lake| lake.level = *level);
@@ -72,7 +72,8 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     let crossed = water(&strands);
     let afloat = afloat(&rounded.outlines, &waters.lakes, &roads, &sides(&roads), &site);
     let pins = with_water(&roads, Vec::new(), &afloat, &mut remarks);
-    let heights = grade(&roads, [&ground; 2], &pins, &crossed, GradeOptions::USUAL, &mut remarks);
+    let below = Below { water: &crossed, ..Below::WAYS };
+    let heights = grade(&roads, [&ground; 2], &pins, below, GradeOptions::USUAL, &mut remarks);
     for (number, edge) in roads.edges.iter().enumerate() {
         let rise = (heights[edge.a as usize] - heights[edge.b as usize]).abs();
         // In whole quanta: half a quantum more is the least that an edge of a few centimetres can rise.
