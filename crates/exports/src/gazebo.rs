@@ -180,15 +180,14 @@ fn world(product: &Product, mesh: &Mesh, blocks: &[Block]) -> Result<String, Exp
     Ok(text)
 }
 
-/// By how many degrees the world's y lies left of true north, seen from the world's origin to the corner across.
+/// By how many degrees the world's y lies left of true north, at the world's origin.
 fn heading_deg(product: &Product, earth: &Earth) -> Result<f64, ExportError> {
-    let rect = product.rect;
-    let ends_m = [product.corner_m(rect.south, rect.west), product.corner_m(rect.north, rect.east)];
-    let [from, to] = [earth.lon_lat(ends_m[0])?, earth.lon_lat(ends_m[1])?];
+    let [x, y] = product.corner_m(product.rect.south, product.rect.west);
+    // So near that the map is not bent between, and far enough for digits of the places.
+    let [from, to] = [earth.lon_lat([x, y])?, earth.lon_lat([x, y + 1.0])?];
     let along = minus(earth_centred(to, 0.0), earth_centred(from, 0.0));
     let [east, north, _] = directions(from).map(|axis| dot(axis, along));
-    let [x, y] = [0, 1].map(|axis| ends_m[1][axis] - ends_m[0][axis]);
-    Ok((x * north - y * east).atan2(x * east + y * north).to_degrees())
+    Ok((-east).atan2(north).to_degrees())
 }
 
 /// Whom to thank for the sources, as part of a comment, which must not end there.
@@ -327,5 +326,16 @@ mod tests {
             let off = (dot(axis_east, expected) - east).hypot(dot(axis_north, expected) - north);
             assert!(off < 0.5e-3 * x.hypot(y), "{off} m at {x} {y}");
         }
+    }
+
+    #[test]
+    fn north_of_a_mercator_projection_is_true_north() {
+        let mut product = samples::product();
+        (product.frame.origin_east_m, product.frame.origin_north_m) = (1_058_000.0, 5_950_000.0);
+        product.manifest.area.crs = "EPSG:3857".into();
+        let world = &samples::texts(|put, work| write_gazebo(&product, put, work))["area.sdf"];
+        let (_, rest) = world.split_once("<heading_deg>").unwrap();
+        let heading: f64 = rest.split_once('<').unwrap().0.parse().unwrap();
+        assert!(heading.abs() < 1e-6, "{heading}");
     }
 }

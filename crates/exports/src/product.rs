@@ -53,8 +53,10 @@ pub struct Product {
     pub modules: Vec<LoadModule>,
     /// The same at coarser levels, where these are exported, too.
     pub coarser: Vec<Vec<LoadModule>>,
-    /// Middle lines of ways in each of them, which the finest level alone has.
+    /// Middle lines of ways in each of them, without ways in the ground that this level leaves out.
     pub lines: Vec<Vec<ModuleLine>>,
+    /// Classes of ways that each level beside the finest leaves out, and coarser ones with it.
+    pub(crate) left_out: Vec<Vec<u8>>,
     /// Whether ways that are lines in the ground are seen as bands over it.
     pub has_ribbons: bool,
     /// Other names for materials.
@@ -127,7 +129,8 @@ impl Product {
         let (Some(first), Some(modules)) = (tiles.first(), levels.next()) else { return Err(damaged(0, rect)) };
         let (grid, frame) = (first.grid, first.frame);
         let coarser = levels.collect();
-        let (lines, has_ribbons, materials, textures) = (Vec::new(), true, Vec::new(), None);
+        let (lines, left_out, has_ribbons) = (Vec::new(), Vec::new(), true);
+        let (materials, textures) = (Vec::new(), None);
         let mut product = Self {
             manifest,
             class_names,
@@ -139,6 +142,7 @@ impl Product {
             modules,
             coarser,
             lines,
+            left_out,
             has_ribbons,
             materials,
             textures,
@@ -162,7 +166,30 @@ impl Product {
     pub(crate) fn levels(&self) -> impl Iterator<Item = Self> {
         let coarser = (self.level + 1..).zip(&self.coarser);
         let all = std::iter::once((self.level, &self.modules)).chain(coarser);
-        all.map(|(level, modules)| Self { level, modules: modules.clone(), coarser: Vec::new(), ..self.clone() })
+        all.map(|(level, modules)| {
+            let lines = self.lines_at(level);
+            Self { level, modules: modules.clone(), coarser: Vec::new(), lines, ..self.clone() }
+        })
+    }
+
+    /// The same without the ways that its levels leave out of the ground: names of their classes for each level beside
+    /// the finest, as the job has them.
+    #[must_use]
+    pub fn leaving_out(mut self, levels: &[Vec<String>]) -> Self {
+        let numbers = |names: &Vec<String>| -> Vec<u8> {
+            let named = (0..).zip(&self.class_names).filter(|(_, name)| names.contains(name));
+            named.map(|(class, _)| class).collect()
+        };
+        self.left_out = levels.iter().map(numbers).collect();
+        self.lines = self.lines_at(self.level);
+        self
+    }
+
+    /// The lines of a level, which is no finer than its own.
+    fn lines_at(&self, level: usize) -> Vec<Vec<ModuleLine>> {
+        let is_left_out = |class: &u8| self.left_out.iter().take(level).flatten().any(|other| other == class);
+        let stays = |line: &&ModuleLine| !line.traits.is_in_ground || !is_left_out(&line.class);
+        self.lines.iter().map(|lines| lines.iter().filter(stays).cloned().collect()).collect()
     }
 
     /// Length of a load module's side in quanta of 1/128 m.

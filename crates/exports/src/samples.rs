@@ -64,6 +64,7 @@ pub(crate) fn product() -> Product {
         modules: modules(),
         coarser: Vec::new(),
         lines: Vec::new(),
+        left_out: Vec::new(),
         has_ribbons: true,
         materials: Vec::new(),
         textures: None,

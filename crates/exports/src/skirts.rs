@@ -11,8 +11,8 @@ use crate::{Mesh, Product};
 /// A side of a square: places of the mesh that have the same easting, or northing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Side {
-    axis: usize,
-    at: i32,
+    pub axis: usize,
+    pub at: i32,
 }
 
 impl Side {
@@ -23,7 +23,7 @@ impl Side {
         [(0, west), (0, east), (1, south), (1, north)].map(|(axis, at)| Self { axis, at })
     }
 
-    fn holds(self, place: [i32; 3]) -> bool {
+    pub(crate) fn holds(self, place: [i32; 3]) -> bool {
         place[self.axis] == self.at
     }
 }
@@ -50,10 +50,10 @@ pub(crate) fn depths(sides: &[Side], meshes: &[Vec<[i32; 3]>]) -> Vec<Depths> {
 
 /// A mesh along a side: places on that, in order, and their heights, in quanta.
 #[derive(Debug, PartialEq)]
-struct Line(Vec<[i32; 2]>);
+pub(crate) struct Line(Vec<[i32; 2]>);
 
 impl Line {
-    fn of(side: Side, places: &[[i32; 3]]) -> Self {
+    pub(crate) fn of(side: Side, places: &[[i32; 3]]) -> Self {
         let on_side = places.iter().filter(|place| side.holds(**place));
         let mut line: Vec<[i32; 2]> = on_side.map(|place| [place[1 - side.axis], place[2]]).collect();
         line.sort_unstable();
@@ -61,8 +61,13 @@ impl Line {
         Self(line)
     }
 
+    /// Where it begins and ends; both at 0 where it has no place.
+    pub(crate) fn ends(&self) -> [i32; 2] {
+        [self.0.first(), self.0.last()].map(|end| end.map_or(0, |[along, _]| *along))
+    }
+
     /// The height at a place between its ends.
-    fn height(&self, at: i32) -> Option<f64> {
+    pub(crate) fn height(&self, at: i32) -> Option<f64> {
         let next = self.0.partition_point(|[along, _]| *along < at);
         let [b, height] = *self.0.get(next)?;
         if b == at {

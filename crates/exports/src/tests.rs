@@ -259,6 +259,22 @@ fn ribbons_lie_5_cm_over_the_ground_as_wide_as_their_ways_and_once() {
     assert!(document["nodes"].as_array().unwrap().iter().any(|node| node["name"] == "ribbons_r0000c0001"));
 }
 
+#[test]
+fn a_level_has_no_ribbons_of_what_it_leaves_out() {
+    let mut product = samples::with_ways();
+    product.coarser = vec![product.modules.clone(); 2];
+    let product = product.leaving_out(&[vec![], vec!["stream".into()]]);
+    let ribbons = |product: &Product| -> Vec<String> {
+        let found = meshes(&glb(product)).into_iter().filter(|mesh| mesh.node.starts_with("ribbons"));
+        found.map(|mesh| mesh.material).collect::<std::collections::BTreeSet<_>>().into_iter().collect()
+    };
+    let levels: Vec<_> = product.levels().map(|level| ribbons(&level)).collect();
+    assert_eq!(levels, [vec!["minor", "stream"], vec!["minor", "stream"], vec!["minor"]]);
+    // A level that is exported alone.
+    let alone = Product { level: 2, ..samples::with_ways() }.leaving_out(&[vec!["minor".into()], vec![]]);
+    assert_eq!(ribbons(&alone), ["stream"]);
+}
+
 /// An orthophoto of a metre a pixel over all of the sample, in dark and light squares of 20 m, dark in the south-west.
 fn checkerboard(path: &Path) {
     let is_light = |east: usize, north: usize| (east / 20 + north / 20) % 2 == 1;

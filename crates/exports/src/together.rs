@@ -11,6 +11,7 @@ use source_files::Crs;
 use store::Manifest;
 use terrain::ModuleRect;
 
+use crate::borders::{Border, Gap};
 use crate::covered::{Cover, Covered, take_out};
 use crate::tiles3d::write_on;
 use crate::{Datum, Earth, ExportError, Product, Put, Work};
@@ -30,6 +31,8 @@ struct Footing {
     manifest: Manifest,
     crs: Crs,
     earth: Option<Earth>,
+    /// Its ground along its sides, once it is written.
+    border: Option<Border>,
 }
 
 /// What was written of an area.
@@ -64,7 +67,7 @@ impl Together {
             let area = &manifest.area;
             let rect = ModuleRect { south: 0, west: 0, north: area.module_rows, east: area.module_cols };
             let earth = Earth::under(area, rect, assumed).map_err(|error| error.of(&name))?;
-            areas.push(Footing { crs: earth.crs().clone(), manifest, earth: None });
+            areas.push(Footing { crs: earth.crs().clone(), manifest, earth: None, border: None });
             earths.push(earth);
         }
         areas.iter_mut().zip(Earth::together(earths)).for_each(|(area, earth)| area.earth = Some(earth));
@@ -94,6 +97,7 @@ impl Together {
         if covered.left_out == product.modules.len() {
             return Ok(part);
         }
+        self.areas[number].border = Some(Border::of(&product, &earth)?);
         let folder = number + 1;
         let index = Mutex::new(Value::Null);
         let put = |name: &str, bytes: &[u8]| {
@@ -112,6 +116,17 @@ impl Together {
             "content": { "uri": format!("{folder}/tileset.json") },
         }));
         Ok(part)
+    }
+
+    /// How areas that are written, of one coordinate system, gape along common borders; nothing of those that meet.
+    pub fn gaps(&self) -> Vec<Gap> {
+        let pairs = (0..self.areas.len()).flat_map(|one| (one + 1..self.areas.len()).map(move |other| [one, other]));
+        let gap = |numbers: [usize; 2]| {
+            let [one, other] = numbers.map(|number| &self.areas[number]);
+            let borders = [one.border.as_ref()?, other.border.as_ref()?];
+            (one.crs == other.crs).then(|| Border::gap(numbers, borders)).flatten()
+        };
+        pairs.filter_map(gap).collect()
     }
 
     /// Writes the index, when all areas are; the bytes of all files.

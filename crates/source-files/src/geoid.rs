@@ -11,6 +11,7 @@ use crate::crs::Crs;
 use crate::frame::SampleScale;
 use crate::samples::VoidPosts;
 use crate::samples::{Samples, union};
+use crate::warp::Net;
 
 /// Heights of a datum's zero above the ellipsoid, as far as they were read.
 #[derive(Debug)]
@@ -124,19 +125,23 @@ impl DatumShift {
 
     /// What is to be added at the posts of a rectangle.
     pub(crate) fn over(&self, area: &Crs, grid: &GridFrame, rect: PostRect) -> Shifts {
-        let near = |post: i32| post.div_euclid(STEP_POSTS);
-        let far = |post: i32| near(post) + 1;
-        let net =
-            PostRect { south: near(rect.south), west: near(rect.west), north: far(rect.north), east: far(rect.east) };
+        let net = Net::of(grid, STEP_POSTS);
+        let near = |axis: usize, post: i32| net.split(axis, post).0;
+        let lines = PostRect {
+            south: near(1, rect.south),
+            west: near(0, rect.west),
+            north: near(1, rect.north) + 1,
+            east: near(0, rect.east) + 1,
+        };
         let wgs84 = Crs::wgs84();
         let quanta = |row: i32, col: i32| {
-            let place = area.to(&wgs84, [grid.east_m(col * STEP_POSTS), grid.north_m(row * STEP_POSTS)]);
+            let place = area.to(&wgs84, [grid.east_m(net.post(0, col)), grid.north_m(net.post(1, row))]);
             let metres = place.and_then(|place| self.metres(place)).unwrap_or(0.0);
             // Rounded, so that the last digits of sines, which differ from machine to machine, do not decide.
             (metres * f64::from(QUANTA_PER_METRE) * ROUNDED).round() / ROUNDED
         };
-        let nodes = (net.south..=net.north).flat_map(|row| (net.west..=net.east).map(move |col| (row, col)));
-        Shifts { net, quanta: nodes.map(|(row, col)| quanta(row, col)).collect() }
+        let nodes = (lines.south..=lines.north).flat_map(|row| (lines.west..=lines.east).map(move |col| (row, col)));
+        Shifts { net, lines, quanta: nodes.map(|(row, col)| quanta(row, col)).collect() }
     }
 }
 
@@ -147,17 +152,17 @@ const ROUNDED: f64 = 1024.0;
 
 /// What is to be added to heights, every sixteenth post; in between it is interpolated.
 pub(crate) struct Shifts {
-    net: PostRect,
+    net: Net,
+    lines: PostRect,
     quanta: Vec<f64>,
 }
 
 impl Shifts {
     pub(crate) fn quanta_at(&self, row: i32, col: i32) -> f64 {
-        let (south, west) = (row.div_euclid(STEP_POSTS), col.div_euclid(STEP_POSTS));
-        let share = |post: i32| f64::from(post.rem_euclid(STEP_POSTS)) / f64::from(STEP_POSTS);
-        let (up, right) = (share(row), share(col));
-        let at = (south - self.net.south) as usize * self.net.posts_wide() + (west - self.net.west) as usize;
-        let far = at + self.net.posts_wide();
+        let ((south, up), (west, right)) = (self.net.split(1, row), self.net.split(0, col));
+        let [up, right] = [up, right].map(|posts| f64::from(posts) / f64::from(STEP_POSTS));
+        let at = (south - self.lines.south) as usize * self.lines.posts_wide() + (west - self.lines.west) as usize;
+        let far = at + self.lines.posts_wide();
         let near = self.quanta[at] * (1.0 - right) + self.quanta[at + 1] * right;
         near * (1.0 - up) + (self.quanta[far] * (1.0 - right) + self.quanta[far + 1] * right) * up
     }

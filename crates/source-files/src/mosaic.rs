@@ -13,7 +13,7 @@ use crate::geoid::Shifts;
 use crate::join::{Standing, fits, join, overlaps};
 use crate::samples::{Sample, each};
 use crate::warp::{Place, Warp};
-use crate::{DatumShift, DemFile, Raster, RasterFrame, SourceError};
+use crate::{DatumShift, DemFile, Raster, RasterFrame, Reach, SourceError};
 
 /// What becomes of voids in a mosaic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -453,5 +453,10 @@ impl DemFile {
     /// The posts that lie under the posts `rect` of a grid in the system `area`; `None` when there are none.
     pub fn window_reaching(&self, area: &Crs, grid: &GridFrame, rect: PostRect) -> Option<PostRect> {
         window_reaching(self.frame(), area, grid, rect)
+    }
+
+    /// Its posts that the posts of `rect` lie among: those that interpolation between neighbours takes.
+    pub fn reach(&self, area: &Crs, grid: &GridFrame, rect: PostRect) -> Reach {
+        Warp::new(self.frame(), area, grid).reach(rect)
     }
 }

@@ -8,8 +8,8 @@ use terrain::{Dem, Post, PostRect, QUANTA_PER_METRE, quanta_of_metres};
 use crate::chunk::{Chunk, Header, Meaning};
 use crate::frame::{RasterFrame, SampleScale};
 use crate::limits::HEIGHT_M_MAX;
-use crate::samples::{Samples, VoidPosts, each, number};
-use crate::{DatumShift, SourceError};
+use crate::samples::{Samples, VoidPosts, each, number, union};
+use crate::{DatumShift, Reach, SourceError};
 
 /// The posts of a window of a raster. Posts are counted from the south-west post of the whole raster.
 #[derive(Clone, Debug)]
@@ -130,6 +130,17 @@ impl Raster {
     /// Lowest and highest height in metres, voids left out; `None` when all are void.
     pub fn range_m(&self) -> Option<(f64, f64)> {
         self.range_m
+    }
+
+    /// The same of the posts that others lie among.
+    pub fn range_within_m(&self, reach: &Reach) -> Option<(f64, f64)> {
+        let mut row_m = Vec::new();
+        let ranges = reach.within(self.window).filter_map(|(row, cols)| {
+            row_m.clear();
+            self.push_row_m(row, cols, &mut row_m);
+            row_m.iter().filter(|height| !height.is_nan()).map(|&height| (height, height)).reduce(union)
+        });
+        ranges.reduce(union)
     }
 
     /// Has a mosaic bring its heights to another datum.

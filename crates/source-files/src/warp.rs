@@ -2,8 +2,11 @@
 //!
 //! In another system only every sixteenth post is projected, and what lies between is interpolated in whole numbers:
 //! that is off by a few millimetres at most, and it keeps the last digits of sines and logarithms, which differ from
-//! machine to machine, nearly always out of the result. Projected places hang on the grid and not on the window asked
-//! for, so two tiles see the same ground at the seam between them.
+//! machine to machine, nearly always out of the result. Projected places hang on the system and not on the area or the
+//! window asked for, so two tiles see the same ground at the seam between them, and two areas on a common border.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 use terrain::geometry::resample::TAP_UNITS;
 use terrain::{GridFrame, PostRect};
@@ -30,7 +33,33 @@ pub(crate) struct Warp {
     grid: GridFrame,
     /// The grid's system, where it is not the raster's.
     other: Option<Crs>,
+    net: Net,
+}
+
+/// Every so many posts of a grid, counted from easting and northing 0, whatever post is the grid's first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Net {
     step: i32,
+    /// Columns and rows from a line of the net to the first of the grid.
+    past: [i32; 2],
+}
+
+impl Net {
+    pub(crate) fn of(grid: &GridFrame, step: i32) -> Self {
+        let past = |origin_m: f64| (origin_m / grid.spacing.metres()).floor().rem_euclid(f64::from(step)) as i32;
+        Self { step, past: [past(grid.origin_east_m), past(grid.origin_north_m)] }
+    }
+
+    /// The line of the net at or before a row or column, and posts from there.
+    pub(crate) fn split(self, axis: usize, post: i32) -> (i32, i32) {
+        let post = post + self.past[axis];
+        (post.div_euclid(self.step), post.rem_euclid(self.step))
+    }
+
+    /// The row or column on a line of the net.
+    pub(crate) fn post(self, axis: usize, line: i32) -> i32 {
+        line * self.step - self.past[axis]
+    }
 }
 
 impl Warp {
@@ -40,7 +69,7 @@ impl Warp {
             step /= 2;
         }
         let other = (frame.crs != *area).then(|| area.clone());
-        Self { frame: frame.clone(), grid: *grid, other, step }
+        Self { frame: frame.clone(), grid: *grid, other, net: Net::of(grid, step) }
     }
 
     /// The place of one post, projected.
@@ -61,7 +90,7 @@ impl Warp {
     }
 
     /// The places of all posts of a rectangle.
-    pub(crate) fn over(&self, rect: PostRect) -> Places<'_> {
+    pub(crate) fn over(&self, rect: PostRect) -> Places {
         if self.other.is_none() {
             let units = |posts: f64| {
                 let units = posts * f64::from(TAP_UNITS);
@@ -71,13 +100,17 @@ impl Warp {
             let rows = (rect.south..=rect.north).map(|row| units(row_of(&self.frame, &self.grid, row))).collect();
             return Places { rect, kind: Kind::Aligned { cols, rows } };
         }
-        let near = |post: i32| post.div_euclid(self.step);
-        let far = |post: i32| -(-post).div_euclid(self.step);
-        let net =
-            PostRect { south: near(rect.south), west: near(rect.west), north: far(rect.north), east: far(rect.east) };
-        let posts = (net.south..=net.north).flat_map(|row| (net.west..=net.east).map(move |col| (row, col)));
-        let places = posts.map(|(row, col)| self.projected(row * self.step, col * self.step)).collect();
-        Places { rect, kind: Kind::Net { warp: self, net, places } }
+        let near = |axis: usize, post: i32| self.net.split(axis, post).0;
+        let far = |axis: usize, post: i32| near(axis, post) + i32::from(0 < self.net.split(axis, post).1);
+        let lines = PostRect {
+            south: near(1, rect.south),
+            west: near(0, rect.west),
+            north: far(1, rect.north),
+            east: far(0, rect.east),
+        };
+        let nodes = (lines.south..=lines.north).flat_map(|row| (lines.west..=lines.east).map(move |col| (row, col)));
+        let places = nodes.map(|(row, col)| self.projected(self.net.post(1, row), self.net.post(0, col))).collect();
+        Places { rect, kind: Kind::Net { net: self.net, lines, places } }
     }
 
     /// The posts of the raster under a rectangle of the grid, with `margin` posts around them; `None` when the raster
@@ -111,6 +144,31 @@ impl Warp {
         Some(PostRect { south, west, north, east })
     }
 
+    /// The posts of the raster that the posts of a rectangle of the grid lie among.
+    pub(crate) fn reach(&self, rect: PostRect) -> Reach {
+        let places = self.over(rect);
+        let rows = || rect.south..=rect.north;
+        let cols = || rect.west..=rect.east;
+        let sides: [Vec<Place>; 4] = [
+            cols().map(|col| places.at(rect.south, col)).collect(),
+            cols().map(|col| places.at(rect.north, col)).collect(),
+            rows().map(|row| places.at(row, rect.west)).collect(),
+            rows().map(|row| places.at(row, rect.east)).collect(),
+        ];
+        let mut reach = Reach::default();
+        let unit = i64::from(TAP_UNITS);
+        for [a, b] in sides.iter().flat_map(|side| side.windows(2)).filter_map(|pair| Some([pair[0]?, pair[1]?])) {
+            let [cols, rows] = [0, 1].map(|axis| {
+                let (low, high) = (a[axis].min(b[axis]), a[axis].max(b[axis]));
+                let inside = |post: i64, count: u32| post.clamp(-1, i64::from(count)) as i32;
+                let count = [self.frame.cols, self.frame.rows][axis];
+                (inside(low.div_euclid(unit), count), inside(-(-high).div_euclid(unit), count))
+            });
+            (rows.0..=rows.1).for_each(|row| reach.widen(row, cols));
+        }
+        reach
+    }
+
     /// Source posts in a metre of ground at the middle of a rectangle, across and along.
     pub(crate) fn posts_per_metre(&self, rect: PostRect) -> [f64; 2] {
         let (row, col) = ((rect.south + rect.north) / 2, (rect.west + rect.east) / 2);
@@ -118,43 +176,60 @@ impl Warp {
         if self.other.is_none() {
             return self.frame.spacing.map(|spacing| 1.0 / spacing);
         }
-        let [Some(a), Some(b), Some(c)] =
-            [(row, col), (row, col + self.step), (row + self.step, col)].map(|(row, col)| self.projected(row, col))
+        let [Some(a), Some(b), Some(c)] = [(row, col), (row, col + self.net.step), (row + self.net.step, col)]
+            .map(|(row, col)| self.projected(row, col))
         else {
             return [1.0 / spacing_m; 2];
         };
         let posts = |from: [i64; 2], to: [i64; 2], axis: usize| (to[axis] - from[axis]).abs() as f64;
-        let per_metre = 1.0 / (f64::from(TAP_UNITS) * spacing_m * f64::from(self.step));
+        let per_metre = 1.0 / (f64::from(TAP_UNITS) * spacing_m * f64::from(self.net.step));
         [posts(a, b, 0).max(posts(a, c, 0)) * per_metre, posts(a, b, 1).max(posts(a, c, 1)) * per_metre]
     }
 }
 
-/// The places of the posts of a rectangle in a raster.
-pub(crate) struct Places<'a> {
-    rect: PostRect,
-    kind: Kind<'a>,
+/// Columns of a raster by row: those between what lies farthest west in a row and what lies farthest east.
+#[derive(Clone, Debug, Default)]
+pub struct Reach(BTreeMap<i32, (i32, i32)>);
+
+impl Reach {
+    fn widen(&mut self, row: i32, (west, east): (i32, i32)) {
+        let cols = self.0.entry(row).or_insert((west, east));
+        *cols = (cols.0.min(west), cols.1.max(east));
+    }
+
+    /// The columns of a window, row by row.
+    pub(crate) fn within(&self, window: PostRect) -> impl Iterator<Item = (i32, Range<i32>)> {
+        let cut =
+            move |(&row, &(west, east)): (&i32, &(i32, i32))| (row, west.max(window.west)..east.min(window.east) + 1);
+        self.0.range(window.south..=window.north).map(cut).filter(|(_, cols)| !cols.is_empty())
+    }
 }
 
-enum Kind<'a> {
+/// The places of the posts of a rectangle in a raster.
+pub(crate) struct Places {
+    rect: PostRect,
+    kind: Kind,
+}
+
+enum Kind {
     /// Rows run along rows: each axis by itself.
     Aligned { cols: Vec<Option<i64>>, rows: Vec<Option<i64>> },
-    /// Between projected places, which lie `step` posts apart; `net` counts steps.
-    Net { warp: &'a Warp, net: PostRect, places: Vec<Place> },
+    /// Between projected places, which lie on lines of a net.
+    Net { net: Net, lines: PostRect, places: Vec<Place> },
 }
 
-impl Places<'_> {
+impl Places {
     /// The place of one post of the rectangle.
     pub(crate) fn at(&self, row: i32, col: i32) -> Place {
         match &self.kind {
             Kind::Aligned { cols, rows } => {
                 Some([cols[(col - self.rect.west) as usize]?, rows[(row - self.rect.south) as usize]?])
             }
-            Kind::Net { warp, net, places } => {
-                let step = warp.step;
-                let (south, west) = (row.div_euclid(step), col.div_euclid(step));
-                let (up, right) = (i64::from(row.rem_euclid(step)), i64::from(col.rem_euclid(step)));
+            Kind::Net { net, lines, places } => {
+                let ((south, up), (west, right)) = (net.split(1, row), net.split(0, col));
+                let (up, right, step) = (i64::from(up), i64::from(right), net.step);
                 let place = |row: i32, col: i32| {
-                    places[(row - net.south) as usize * net.posts_wide() + (col - net.west) as usize]
+                    places[(row - lines.south) as usize * lines.posts_wide() + (col - lines.west) as usize]
                 };
                 // A post on a projected line needs none beyond it.
                 let (north, east) = (south + i32::from(0 < up), west + i32::from(0 < right));

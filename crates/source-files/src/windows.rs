@@ -13,7 +13,8 @@ use crate::chunk::Chunk;
 use crate::directory::SampleKind;
 use crate::geotiff::FileDecoder;
 use crate::kept::{Kept, locked};
-use crate::{DemFile, Raster, SourceError};
+use crate::samples::union;
+use crate::{DemFile, Raster, Reach, SourceError};
 
 /// Files that are read by window. Several threads may ask at once; none decodes what another is decoding.
 #[derive(Debug)]
@@ -64,6 +65,8 @@ pub struct Look {
     pub first_void: Option<String>,
     /// Lowest and highest height in metres.
     pub range_m: Option<(f64, f64)>,
+    /// The same of posts within a reach.
+    pub reached_m: Option<(f64, f64)>,
     /// What a person should know about it.
     pub notes: Vec<String>,
 }
@@ -74,18 +77,20 @@ impl Look {
         self.posts += other.posts;
         self.voids += other.voids;
         self.first_void = self.first_void.take().or(other.first_void);
-        let ranges = [self.range_m, other.range_m].into_iter().flatten();
-        self.range_m = ranges.reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)));
+        let of_both = |ranges: [Option<(f64, f64)>; 2]| ranges.into_iter().flatten().reduce(union);
+        self.range_m = of_both([self.range_m, other.range_m]);
+        self.reached_m = of_both([self.reached_m, other.reached_m]);
         self.notes.append(&mut other.notes);
     }
 }
 
 impl DemFile {
-    /// Looks at the posts of `window` in some of its chunks, one chunk at a time, and keeps nothing.
+    /// Looks at the posts of `window` in some of its chunks, one chunk at a time, and keeps nothing; `reach` is what to
+    /// tell the range of, too.
     ///
     /// # Errors
     /// As [`DemFile::decode`] and [`DemFile::assemble`].
-    pub fn look(&self, window: PostRect, chunks: &[u32]) -> Result<Look, SourceError> {
+    pub fn look(&self, window: PostRect, reach: Option<&Reach>, chunks: &[u32]) -> Result<Look, SourceError> {
         let (mut look, mut kept) = (Look::default(), None);
         for &chunk in chunks {
             let Some(cut) = self.posts_of(chunk).intersection(&window) else { continue };
@@ -96,6 +101,7 @@ impl DemFile {
                 voids: raster.void_count(),
                 first_void,
                 range_m: raster.range_m(),
+                reached_m: reach.and_then(|reach| raster.range_within_m(reach)),
                 notes: raster.notes().to_vec(),
             });
         }

@@ -104,6 +104,7 @@ pub(crate) fn report() -> Report {
         }),
         border: Some(store::ReportBorder {
             at_border: store::ReportPart { posts: 77_000, rms_m: 3.4, max_m: 31.0 },
+            fixed: false,
             inside: store::ReportPart { posts: 3_823_528, rms_m: 3.2, max_m: 36.5 },
         }),
         heights: Some(store::ReportHeights {

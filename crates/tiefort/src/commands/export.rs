@@ -327,16 +327,17 @@ fn tell_size(arguments: &Arguments, product: &Product) -> Result<(), Failure> {
 
 /// What of a database is exported, as it is to be seen.
 fn prepared(arguments: &Arguments, database: &Path, work: &Work) -> Result<Product, Failure> {
-    let mut product = Product::read(database, arguments.modules, levels(arguments), work)?;
+    let product = Product::read(database, arguments.modules, levels(arguments), work)?;
+    let job = Job::from_text(&product.manifest.job, database)?;
+    let mut product = product.leaving_out(&job.lod.leave_out);
     product.has_ribbons = arguments.ribbons;
-    product.name_materials(materials(arguments, database, &product)?)?;
+    product.name_materials(materials(arguments, job.materials)?)?;
     open_imagery(arguments, &mut product)?;
     Ok(product)
 }
 
-/// What materials are called: as the job says, and before that as the arguments say.
-fn materials(arguments: &Arguments, database: &Path, product: &Product) -> Result<Vec<MaterialName>, Failure> {
-    let mut materials = Job::from_text(&product.manifest.job, database)?.materials;
+/// What materials are called: as the job says in `materials`, and before that as the arguments say.
+fn materials(arguments: &Arguments, mut materials: Vec<MaterialName>) -> Result<Vec<MaterialName>, Failure> {
     for (at, (of, name)) in arguments.materials.iter().cloned().enumerate() {
         if arguments.materials[..at].iter().any(|(before, _)| *before == of) {
             return Err(Failure::new(format!("found --material {of}=… twice"), "give each material one name"));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use exports::{Covered, Datum, ExportError, Product, Put, Together, Work};
+use exports::{Covered, Datum, ExportError, Gap, Product, Put, Together, Work};
 use store::Folder;
 use views::grouped;
 
@@ -77,6 +77,13 @@ impl Several<'_> {
             let lines = [written.datum.said(), holds];
             let lines = lines.iter().flat_map(|lines| lines.lines()).map(str::to_owned).chain(under(written.covered));
             lines.for_each(|line| told += &format!("{}: {line}\n", database.display()));
+        }
+        for Gap { areas, border_m, gaping_m, most_m } in together.gaps() {
+            let [one, other] = areas.map(|number| self.databases[number].display());
+            told += &format!(
+                "{one} and {other}: along {gaping_m:.0} of {border_m:.0} m of their common border the grounds lie more \
+                 than 5 cm apart, {most_m:.2} m at most\n"
+            );
         }
         let bytes = together.finish(put)?;
         Ok(format!("{told}{} databases in one tileset, {}", self.databases.len(), files::bytes_text(bytes)))

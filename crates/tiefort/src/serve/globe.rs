@@ -9,6 +9,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use axum::body::Bytes;
 use axum::http::StatusCode;
 use exports::{Datum, ExportError, Levels, Product, QuantizedMesh, Tileset, Work};
+use job::Job;
 use lru::LruCache;
 use schedule::Workers;
 
@@ -104,8 +105,9 @@ impl Globes {
     }
 
     fn tileset(&self, of: &Contents) -> Result<Tileset, Refusal> {
+        let job = Job::from_text(&of.manifest.job, &of.folder).map_err(Refusal::of)?;
         worked(of, |work| {
-            let product = Product::read(&of.folder, None, Levels::From(0), work)?;
+            let product = Product::read(&of.folder, None, Levels::From(0), work)?.leaving_out(&job.lod.leave_out);
             Tileset::of(&product, self.assumed, work)
         })
     }

@@ -48,7 +48,7 @@ fn several_databases_are_one_tileset_in_which_the_finer_lies_above_the_coarser()
     ] {
         assert!(said.contains(part), "{part:?} is not in: {said}");
     }
-    assert!(!said.contains("east.tdb: 0"), "{said}");
+    assert!(!said.contains("east.tdb: 0") && !said.contains("common border"), "{said}");
     let json = |name: &str| -> Value { serde_json::from_slice(&fs::read(scene.path(name)).unwrap()).unwrap() };
     let index = json("one/tileset.json");
     let uri = |tile: &Value| tile["content"]["uri"].as_str().unwrap().to_owned();
@@ -75,6 +75,17 @@ fn several_databases_are_one_tileset_in_which_the_finer_lies_above_the_coarser()
     assert!(archive == fs::read(scene.path("two.3tz")).unwrap());
     let holds = |part: &[u8]| archive.windows(part.len()).any(|window| window == part);
     assert!(one.values().flatten().all(|bytes| holds(&bytes[..bytes.len().min(4096)])));
+}
+
+#[test]
+fn areas_that_gape_on_their_common_border_are_told() {
+    let scene = built();
+    let job = fs::read_to_string(scene.path("east.toml")).unwrap().replace("\"fixed\"", "\"refined\"");
+    fs::write(scene.path("free.toml"), job).unwrap();
+    scene.run_to(0, &["build", "free.toml", "--out", "free.tdb", "--quiet"]);
+    let said = scene.run_to(0, &["export", "west.tdb", "free.tdb", "--format", "3tz", "--out", "both.3tz"]).stderr;
+    let (_, told) = said.split_once("west.tdb and free.tdb: along ").unwrap();
+    assert!(told.contains(" of 2000 m of their common border the grounds lie more than 5 cm apart, "), "{said}");
 }
 
 #[test]

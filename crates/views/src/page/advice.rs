@@ -180,11 +180,25 @@ fn mean(report: &Report) -> Option<Advice> {
         ),
         change: format!("limits.mean_per_load_module = {more}"),
         effect: format!(
-            "On most ground the RMS residual falls as the number of triangles grows: about {:.2} m instead of {:.2} m.",
-            report.residual.rms_m * now / more,
-            report.residual.rms_m
+            "On most ground the RMS residual falls as the number of triangles grows{}.",
+            fallen(report, now / more)
         ),
     })
+}
+
+/// By how much the RMS residual falls where it falls to a share, as far as that is known: what lies at a fixed outer
+/// border hardly gains, however large its part in the whole.
+fn fallen(report: &Report, share: f64) -> String {
+    let fall = |rms_m: f64| format!("about {:.2} m instead of {rms_m:.2} m", share * rms_m);
+    match &report.border {
+        None => String::new(),
+        Some(border) if border.fixed => format!(
+            ": {} inside. Load modules at the fixed outer border, now {:.2} m off, gain less",
+            fall(border.inside.rms_m),
+            border.at_border.rms_m
+        ),
+        Some(_) => format!(": {}", fall(report.residual.rms_m)),
+    }
 }
 
 fn importance(report: &Report) -> Option<Advice> {
@@ -245,6 +259,19 @@ mod tests {
         assert_eq!(advice[1].change, "limits.per_load_module = 105", "99 there, and 3 posts of 2 triangles");
         assert_eq!(advice[2].change, "limits.pool = 506");
         assert_eq!(advice[3].change, "limits.per_4km_square = 4106");
+    }
+
+    #[test]
+    fn a_higher_mean_promises_nothing_for_a_fixed_border() {
+        let effect = |report: &Report| mean(report).unwrap().effect;
+        let mut report = samples::report();
+        assert!(effect(&report).ends_with("grows: about 2.40 m instead of 3.00 m."), "{}", effect(&report));
+        report.border = report.border.map(|border| store::ReportBorder { fixed: true, ..border });
+        let told =
+            "about 2.56 m instead of 3.20 m inside. Load modules at the fixed outer border, now 3.40 m off, gain";
+        assert!(effect(&report).contains(told), "{}", effect(&report));
+        report.border = None;
+        assert!(effect(&report).ends_with("triangles grows."), "{}", effect(&report));
     }
 
     #[test]
