@@ -54,8 +54,12 @@ pub fn build(
     }
     let mut run = open(job, folder, options, progress)?;
     // Files of tiles of another size, or heights above something else, are of no use.
-    let is_other = |previous: &Manifest| previous.area != database_area(job);
-    if options.fresh || run.previous.as_ref().is_some_and(is_other) {
+    let is_other = run.previous.as_ref().is_some_and(|previous| previous.area != database_area(job));
+    if is_other {
+        let note = "the database has other tiles or another vertical datum than the job: nothing of it is kept";
+        progress.tell(Event::Note(note.into()));
+    }
+    if options.fresh || is_other {
         run.previous = None;
         run.database.begin_afresh(&beginning(&run))?;
     } else {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::product::Told;
 use fidelity::{Curvature, Residuals, Tally};
-use job::HOLE_CLASS_NAME;
+use job::{HOLE_CLASS_NAME, OuterBorder};
 use store::{
     Report, ReportBefore, ReportBorder, ReportBreach, ReportClass, ReportEnough, ReportHeights, ReportLevel,
     ReportLimit, ReportPart, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints, ReportPool, ReportRefusals,
@@ -221,7 +221,8 @@ impl Findings<'_> {
             part_of(modules.map(|id| numbers.get(id).residual))
         };
         let inside = part(false);
-        (0 < inside.posts).then(|| ReportBorder { at_border: part(true), inside })
+        let fixed = self.run.job.modules.outer_border == OuterBorder::Fixed;
+        (0 < inside.posts).then(|| ReportBorder { at_border: part(true), fixed, inside })
     }
 
     fn heights(&self) -> ReportHeights {

@@ -172,15 +172,26 @@ fn refuse_unfinished(run: &Run, folder: &Folder, tile: TileId) -> Result<Vec<Til
     }
     let job = run.job.canonical_text();
     if !deciding_lines(&manifest.job).eq(deciding_lines(&job)) {
-        let differs = deciding_lines(&manifest.job).zip(deciding_lines(&job)).find(|(theirs, ours)| theirs != ours);
-        let difference = differs.map_or_else(
-            || "one has more lines than the other".to_owned(),
-            |(theirs, ours)| format!("`{theirs}` there, `{ours}` here"),
-        );
+        let difference = difference(&manifest.job, &job);
         return Err(CompileError::OtherJob { path: folder.dir().display().to_string(), difference });
     }
     let is_frozen = |record: &&store::TileRecord| record.state == store::TileState::Frozen;
     Ok(manifest.tiles.iter().filter(is_frozen).map(store::TileRecord::tile).collect())
+}
+
+/// The first line that only one of two jobs has, or that they have in different words.
+fn difference(theirs: &str, ours: &str) -> String {
+    let lines = |job| deciding_lines(job).collect::<Vec<&str>>();
+    let (theirs, ours) = (lines(theirs), lines(ours));
+    let [there, here] = [(&theirs, &ours), (&ours, &theirs)]
+        .map(|(own, others)| own.iter().copied().find(|line| !others.contains(line)));
+    let key = |line: &'_ str| line.split(" = ").next().map(str::to_owned);
+    match (there, here) {
+        (Some(there), Some(here)) if key(there) == key(here) => format!("`{there}` there, `{here}` here"),
+        (Some(there), None) => format!("`{there}` there alone"),
+        (_, Some(here)) => format!("`{here}` here alone"),
+        (None, None) => "the same lines in another order".into(),
+    }
 }
 
 /// Whether every tile but this one is as the last complete database had it: a re-run of this tile was broken off.

@@ -191,7 +191,7 @@ impl<'a> Session<'a> {
         let unit = Unit::of(Stage::Refine, tile);
         let share = self.work.read_share(tile).map_err(|_| self.spoilt(unit, Unit::whole(Stage::Allocate)))?;
         let features = self.run.tile_features(tile)?;
-        let published = |other| Ok(self.published(unit, other)?.1);
+        let published = |other| Ok(self.published_tile(unit, other)?.1);
         let seeds = inherited(&self.run.area.tiling, tile, &features.kept, published)?;
         refine_tile(&self.run, &share, seeds, tile)
     }
@@ -200,7 +200,7 @@ impl<'a> Session<'a> {
         let area = &self.run.area;
         let mut near = BTreeMap::new();
         for other in around(tile, self.run.job, &self.run.area) {
-            let (stamp, tin) = self.published(Unit::of(Stage::Assemble, tile), other)?;
+            let (stamp, tin) = self.published_tile(Unit::of(Stage::Assemble, tile), other)?;
             self.run.tins.keep(stamp, tin);
             near.insert(area.tiling.index(other), stamp);
         }
@@ -210,7 +210,7 @@ impl<'a> Session<'a> {
     }
 
     /// The TIN of a tile that is marked as done, as it lies on the disk.
-    fn published(&self, unit: Unit, tile: TileId) -> Result<(Stamp, Arc<TileTin>), CompileError> {
+    fn published_tile(&self, unit: Unit, tile: TileId) -> Result<(Stamp, Arc<TileTin>), CompileError> {
         match self.run.database.folder().read_tile(tile) {
             Ok((stamp, tin))
                 if Some(stamp.fingerprint) == self.work.marks().marked(&Unit::of(Stage::Refine, tile).to_string()) =>
@@ -234,6 +234,14 @@ impl<'a> Session<'a> {
         Ok(self.run.database.sweep()?)
     }
 
+    /// The build that some process has published, once that is swept up.
+    pub fn published(self) -> Result<Built, CompileError> {
+        self.sweep()?;
+        let Run { database, area, .. } = self.run;
+        let report = database.folder().report()?;
+        Ok(Built { report, kept: area.tiles.len(), rebuilt: 0, is_unchanged: true, database })
+    }
+
     /// Declares the database complete, after whatever is still to be done.
     pub fn publish(self, progress: &mut Stopwatch) -> Result<Built, CompileError> {
         self.run.database.sweep()?;
@@ -251,7 +259,7 @@ pub enum UnitEnd {
     /// It is done, and so are others like it.
     Done,
     /// The database was finished and fresh already.
-    Finished,
+    Finished(Box<Built>),
     /// It published the database.
     Published(Box<Built>),
 }
@@ -270,8 +278,7 @@ pub fn perform(
     let progress = &mut Stopwatch::start(options.clock, progress);
     let mut session = Session::join(job, &folder.into(), options, progress)?;
     if session.is_finished {
-        session.sweep()?;
-        return Ok(UnitEnd::Finished);
+        return Ok(UnitEnd::Finished(Box::new(session.published()?)));
     }
     for &unit in units {
         if unit.stage == Stage::Publish {

@@ -35,8 +35,8 @@ pub struct Sharing<'a> {
 pub struct WorkerEnd {
     /// Units of work it did.
     pub units: usize,
-    /// The build, if this worker published it.
-    pub published: Option<Box<Built>>,
+    /// The build, whichever worker published it: to one that did not, it is unchanged.
+    pub built: Box<Built>,
 }
 
 /// How often a lease is renewed while it lasts once.
@@ -56,8 +56,7 @@ pub fn work(
     let progress = &mut Stopwatch::start(options.clock, progress);
     let session = Session::join(job, &folder.into(), options, progress)?;
     if session.is_finished {
-        session.sweep()?;
-        return Ok(WorkerEnd { units: 0, published: None });
+        return Ok(WorkerEnd { units: 0, built: Box::new(session.published()?) });
     }
     let mut worker = Worker {
         open: session.units(),
@@ -74,8 +73,7 @@ pub fn work(
         }
         if worker.is_published() {
             // The process that published may have been ended before it swept up.
-            worker.session.sweep()?;
-            return Ok(WorkerEnd { units: worker.units, published: None });
+            return Ok(WorkerEnd { units: worker.units, built: Box::new(worker.session.published()?) });
         }
         let next = match worker.next() {
             // It was published and swept meanwhile.
@@ -159,7 +157,7 @@ impl Worker<'_, '_> {
         let Self { session, sharing, units, .. } = self;
         progress.tell(Event::Note("every tile is done: publishing".into()));
         let built = hold(sharing, lease, || session.publish(progress))?;
-        Ok(WorkerEnd { units: units + 1, published: Some(Box::new(built)) })
+        Ok(WorkerEnd { units: units + 1, built: Box::new(built) })
     }
 }
 

@@ -12,9 +12,11 @@ use serde_json::Value;
 use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, Folder, ObjectLeftOut, TileState, files};
 use terrain::limits::Windows;
 use terrain::{
-    HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ObjectKind, QUANTA_PER_METRE, RefusedBy, Side,
-    StopReason, TileId, TileTin, metres_of_quanta,
+    HOLE_CLASS, LoadModule, ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ObjectKind, QUANTA_PER_METRE, RefusedBy,
+    Side, StopReason, TileId, TileTin, metres_of_quanta,
 };
+
+use crate::recount;
 
 /// Everything there is to know about one load module.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,7 +101,9 @@ pub struct OneMore {
     pub place_m: [f64; 2],
     /// How far it would stand above the triangle that is there, in metres.
     pub raised_m: f64,
-    /// RMS residual of the load module then, in metres.
+    /// RMS residual of the load module on that ground now and then, in metres.
+    pub rms_before_m: f64,
+    /// See there.
     pub rms_after_m: f64,
     /// Place of this gain among those of the load modules that it is compared with, the largest being 1.
     pub place: usize,
@@ -114,7 +118,14 @@ const DRAWN: u32 = 1024;
 struct Compared {
     mean_squares: f64,
     split: Option<Split>,
+    /// Residuals as they were built, and, of the load module to explain, on the ground that it is split on.
+    built: ModuleResidual,
+    measured: Option<ModuleResidual>,
 }
+
+/// Why a point is not tried on the ground that a database names.
+const OTHER_GROUND: &str =
+    "the ground is no longer what the load module was made from; `tiefort build` makes its tile again";
 
 /// Explains one load module of a finished database.
 ///
@@ -129,12 +140,16 @@ pub fn explain(
 ) -> Result<Explanation, CompileError> {
     let opened = Opened::open(folder)?;
     check_inside(module, opened.area.grid)?;
-    let (compared, no_ground) = match compared(&opened, module, ground, workers) {
+    let (mut compared, mut no_ground) = match compared(&opened, module, ground, workers) {
         Err(error) if error.is_of_the_ground() && matches!(ground, WantedGround::Recorded) => {
             (self::compared(&opened, module, WantedGround::None, workers)?, Some(error.to_string()))
         }
         found => (found?, None),
     };
+    let own = compared.last_mut().expect("a load module is there itself");
+    if matches!(ground, WantedGround::Recorded) && own.measured.is_some_and(|measured| measured != own.built) {
+        (own.split, no_ground) = (None, Some(OTHER_GROUND.into()));
+    }
     let part = around(&opened, module);
     let product = Product::of(&opened, &Wanted { part: Some(part), ground: WantedGround::None, workers })?;
     let tile = opened.area.tiling.tile_of_module(module, opened.area.grid);
@@ -164,13 +179,13 @@ fn check_inside(module: ModuleId, ModuleGrid { rows, cols, .. }: ModuleGrid) -> 
 /// at the end.
 fn compared(
     opened: &Opened,
-    module: ModuleId,
+    id: ModuleId,
     ground: WantedGround,
     workers: usize,
 ) -> Result<Vec<Compared>, ProductError> {
     let area = &opened.area;
     let alone = |ModuleId { row, col }| ModuleRect { south: row, west: col, north: row + 1, east: col + 1 };
-    let own = alone(module);
+    let own = alone(id);
     let parts: Vec<ModuleRect> = match drawn(area.grid) {
         None => area.tiles.iter().map(|tile| area.tiling.modules(*tile, area.grid)).chain([own]).collect(),
         Some(drawn) => drawn.into_iter().map(alone).chain([own]).collect(),
@@ -180,6 +195,10 @@ fn compared(
         let of = |module: &LoadModule| Compared {
             mean_squares: mean_squares(module.residual.sum_squared as f64, module),
             split: ground.as_ref().and_then(|ground| best_split(module, ground)),
+            built: module.residual,
+            measured: window
+                .filter(|_| module.id == id)
+                .map(|window| recount::residual(module, &window.dem, area.grid, area.frame.spacing)),
         };
         modules.iter().map(of).collect::<Vec<_>>()
     })?;
@@ -249,7 +268,7 @@ fn explained(product: &Product, id: ModuleId, tin: &TileTin, allocation: &Value,
         place: (worse + 1, others.len()),
         drawn_of: (others.len() < product.grid.count()).then(|| product.grid.count()),
         refused: refused(product, tin, id),
-        one_more: one_more(product, (own, others), module),
+        one_more: one_more(product, own, others),
         no_ground: None,
         levels: Vec::new(),
         features: explained_features(product, id, [west, south, west + side_m, south + side_m]),
@@ -325,16 +344,17 @@ fn refused(product: &Product, tin: &TileTin, module: ModuleId) -> Vec<ExplainedR
     refused
 }
 
-fn one_more(product: &Product, (own, others): (&Compared, &[Compared]), module: &LoadModule) -> Option<OneMore> {
-    let split = own.split?;
+fn one_more(product: &Product, own: &Compared, others: &[Compared]) -> Option<OneMore> {
+    let (split, ModuleResidual { posts, sum_squared, .. }) = (own.split?, own.measured?);
     let gains = others.iter().filter_map(|other| other.split);
     let larger = gains.filter(|other| split.squares_saved < other.squares_saved).count();
-    let left = (module.residual.sum_squared as f64 - split.squares_saved).max(0.0);
     let metre = f64::from(QUANTA_PER_METRE);
+    let rms_m = |squares: f64| (squares.max(0.0) / f64::from(posts.max(1))).sqrt() / metre;
     Some(OneMore {
         place_m: product.frame.place_m(split.post),
         raised_m: split.raised / metre,
-        rms_after_m: mean_squares(left, module).sqrt() / metre,
+        rms_before_m: rms_m(sum_squared as f64),
+        rms_after_m: rms_m(sum_squared as f64 - split.squares_saved),
         place: larger + 1,
     })
 }

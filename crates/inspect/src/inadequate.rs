@@ -21,6 +21,7 @@ use terrain::{
 };
 
 use crate::measures::read_modules;
+use crate::status::is_outdated;
 
 /// Where a database is not good enough.
 #[derive(Clone, Debug)]
@@ -31,6 +32,8 @@ pub struct Inadequate {
     pub crs: String,
     /// EPSG code of that.
     pub epsg: u32,
+    /// Whether some of its tiles were made from other ground than the rest, as `report.json` says.
+    pub is_outdated: bool,
     /// Where its posts lie.
     pub frame: GridFrame,
     /// East and north of its south-west post, in metres.
@@ -123,6 +126,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         area: manifest.area.name.clone(),
         crs: manifest.area.crs.clone(),
         epsg: job.area.epsg,
+        is_outdated: is_outdated(&folder),
         origin_m: [frame.origin_east_m, frame.origin_north_m],
         spacing_m: frame.spacing.metres(),
         rect: area.rect,

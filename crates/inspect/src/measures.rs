@@ -13,6 +13,8 @@ use serde::Serialize;
 use store::{Folder, Manifest, Totals};
 use terrain::{Dem, Importance, LoadModule, Metres, ModuleId, QUANTA_PER_METRE, Tin};
 
+use crate::status::is_outdated;
+
 /// Which pairs of places a line of sight is tried between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sights {
@@ -64,6 +66,8 @@ pub struct DatabaseFidelity {
     pub against: String,
     /// Whether that has features or water burned into it: never a raster that was named.
     pub is_burned: bool,
+    /// Whether some of its tiles were made from other ground than the rest, as `report.json` says.
+    pub is_outdated: bool,
     /// Residuals as the build measured them, against its own ground.
     pub residual: BuiltResidual,
     /// Residuals at the posts of the raster itself, where those are others than the posts of the working grid.
@@ -170,8 +174,18 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     let measures = compare(&subject, sights, Some(area.grid.side_cells));
     let past_objects = job.objects.is_some().then(|| past_objects(&folder, &area, sights)).transpose()?;
     let is_burned = job.features.is_some() || job.dem.water.is_some();
-    let area = manifest.area.name;
-    Ok(DatabaseFidelity { area, against, is_burned, residual, at_own_posts, measures, past_objects, no_classes })
+    let (area, is_outdated) = (manifest.area.name, is_outdated(&folder));
+    Ok(DatabaseFidelity {
+        area,
+        against,
+        is_burned,
+        is_outdated,
+        residual,
+        at_own_posts,
+        measures,
+        past_objects,
+        no_classes,
+    })
 }
 
 /// Measures a mesh against the raster it was made from, whose posts are so far apart.

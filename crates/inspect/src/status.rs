@@ -34,6 +34,10 @@ pub struct Status {
     pub held: Held,
     /// Every tile, row by row.
     pub tiles: Vec<(TileId, TileProgress)>,
+    /// What shows of damage to a finished one without reading its files, a sentence each.
+    pub damage: Vec<String>,
+    /// Whether only some tiles of it were made again since what all are made from had changed.
+    pub is_outdated: bool,
     /// The versions of the format that its files of load modules have, in ascending order.
     pub formats: BTreeSet<u16>,
 }
@@ -70,7 +74,15 @@ pub fn status(folder: &Path) -> Result<Status, CompileError> {
     let tiles = manifest.tiles.iter().map(|record| (record.tile(), progress(record))).collect();
     let paths = manifest.tiles.iter().map(|record| folder.modules_path(record.tile()));
     let formats = paths.filter_map(|path| format_of(&path)).collect();
-    Ok(Status { manifest, held, tiles, formats })
+    let damage = if complete { folder.visible_damage(&manifest) } else { Vec::new() };
+    let damage = damage.iter().map(|damage| damage.error.to_string()).collect();
+    let is_outdated = complete && is_outdated(&folder);
+    Ok(Status { manifest, held, tiles, damage, is_outdated, formats })
+}
+
+/// Whether only some tiles of a finished database were made again since what all are made from had changed.
+pub(crate) fn is_outdated(folder: &Folder) -> bool {
+    folder.report().is_ok_and(|report| report.outdated)
 }
 
 /// The version of the format that a file of load modules names; nothing where there is no such file.

@@ -168,7 +168,7 @@ pub enum SourceError {
     #[error("{path}: an infinite height at {at}, expected a number or a void")]
     Infinite { path: PathBuf, at: String },
     /// A height in metres is beyond [`crate::limits::HEIGHT_M_MAX`].
-    #[error("{path}: a height of {found} m, expected at most {limit} m either side of 0")]
+    #[error("{path}: a height of {} m, expected at most {limit} m either side of 0", short(*found))]
     HeightOutOfRange { path: PathBuf, found: f64, limit: f64 },
     /// A class raster holds fractions.
     #[error("{path}: samples are {found}, expected whole numbers for a class raster")]
@@ -384,6 +384,11 @@ fn sides(missing: &[(Side, f64)]) -> String {
     let parts: Vec<String> =
         missing.iter().map(|(side, metres)| format!("{metres:.1} m on its {} side", name(side))).collect();
     parts.join(" and ")
+}
+
+/// A number in a few characters, whatever it is.
+pub fn short(number: f64) -> String {
+    if number.abs() < 1e12 || number.is_nan() { number.to_string() } else { format!("{number:e}") }
 }
 
 #[cfg(test)]

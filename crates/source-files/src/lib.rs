@@ -7,7 +7,7 @@
 pub mod limits;
 
 mod error;
-pub use error::SourceError;
+pub use error::{SourceError, short};
 mod content;
 pub use content::{FileState, content};
 mod crs;
@@ -45,6 +45,7 @@ pub use join::Standing;
 mod mosaic;
 mod warp;
 pub use mosaic::{Mosaic, MosaicRules, MosaicVoids, Patch, window_reaching};
+pub use warp::Reach;
 mod edges;
 pub use edges::{EdgeStep, edge_steps, edge_steps_by_window};
 mod geoid_file;

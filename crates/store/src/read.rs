@@ -14,30 +14,46 @@ const FILE_BYTES_MAX: u64 = codec::PAYLOAD_BYTES_MAX + FRAME_BYTES as u64;
 
 /// Whether `bytes`, read from `path`, are those that `stamp` promises, which `list` has: `database.json` or the report.
 pub(crate) fn check_stamp(path: &Path, bytes: &[u8], stamp: &FileStamp, list: &str) -> Result<(), DatabaseError> {
-    let (path, is_of_report) = (path.to_path_buf(), list == files::REPORT);
-    let section = if is_of_report { "whole file, against report.json" } else { "whole file, against database.json" };
     let found = FileStamp::of(bytes);
-    if found.length != stamp.length {
-        return Err(DatabaseError::WrongLength { path, section, found: found.length, expected: stamp.length });
-    }
+    same_length(path, found.length, stamp, list)?;
     if found.blake3 != stamp.blake3 {
         let (found, expected) = (found.blake3.to_string(), stamp.blake3.to_string());
-        return Err(DatabaseError::WrongChecksum { path, section, found, expected });
+        return Err(DatabaseError::WrongChecksum { path: path.to_path_buf(), section: against(list), found, expected });
     }
     Ok(())
 }
 
+/// Whether the file at `path` is there with as many bytes as `stamp` promises; it is not read.
+pub(crate) fn check_length(store: &dyn Store, path: &Path, stamp: &FileStamp, list: &str) -> Result<(), DatabaseError> {
+    same_length(path, length(store, path)?, stamp, list)
+}
+
+fn same_length(path: &Path, found: u64, stamp: &FileStamp, list: &str) -> Result<(), DatabaseError> {
+    if found == stamp.length {
+        return Ok(());
+    }
+    let (path, expected) = (path.to_path_buf(), stamp.length);
+    Err(DatabaseError::WrongLength { path, section: against(list), found, expected })
+}
+
+fn against(list: &str) -> &'static str {
+    if list == files::REPORT { "whole file, against report.json" } else { "whole file, against database.json" }
+}
+
 /// All of a file, unless it is longer than any of ours.
 pub(crate) fn read(store: &dyn Store, path: &Path) -> Result<Vec<u8>, DatabaseError> {
-    let fault = |source| DatabaseError::from_io("read", path, 0, source);
-    let found = match store.target(path).map_err(fault)? {
-        Entry::File(bytes) => bytes,
-        Entry::Folder | Entry::Other => return Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
-    };
+    let found = length(store, path)?;
     if FILE_BYTES_MAX < found {
         return Err(DatabaseError::TooLarge { path: path.to_path_buf(), found, limit: FILE_BYTES_MAX });
     }
-    store.read(path).map_err(fault)
+    store.read(path).map_err(|source| DatabaseError::from_io("read", path, 0, source))
+}
+
+fn length(store: &dyn Store, path: &Path) -> Result<u64, DatabaseError> {
+    match store.target(path).map_err(|source| DatabaseError::from_io("read", path, 0, source))? {
+        Entry::File(bytes) => Ok(bytes),
+        Entry::Folder | Entry::Other => Err(DatabaseError::NotAFile { path: path.to_path_buf() }),
+    }
 }
 
 /// Refuses what is there and no file: a pipe would wait for a writer, and a device may have no end.

@@ -202,6 +202,9 @@ pub struct ReportResidual {
 pub struct ReportBorder {
     /// Of load modules with a side on the outer border.
     pub at_border: ReportPart,
+    /// Whether that border is fixed: more triangles give it no points.
+    #[serde(default)]
+    pub fixed: bool,
     /// Of all others.
     pub inside: ReportPart,
 }

@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
 use crate::page::check_page;
-use crate::read::check_stamp;
+use crate::read::{check_length, check_stamp};
 use crate::{
     DatabaseError, FileStamp, Folder, Manifest, ManifestState, beside_tile, buildings_file, level_file, measured_file,
     outlines_file, slm, tile_file,
@@ -58,7 +58,7 @@ impl Folder {
             }
         }
         // They know times, so the report lists them, and no manifest the report.
-        damage.extend(self.damage_of_reports());
+        damage.extend(self.damage_of_reports(Self::check_bytes));
         let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
         for name in [TILES, MODULES, MEASURED, SURVEY] {
             for path in self.list(&self.path(name))? {
@@ -69,6 +69,17 @@ impl Folder {
             }
         }
         Ok(damage)
+    }
+
+    /// What shows of damage without reading more than the report: files that `manifest` or the report lists and that are
+    /// not there or have another length, and a report that is missing or of another build.
+    pub fn visible_damage(&self, manifest: &Manifest) -> Vec<Damage> {
+        let listed = self.listed_files(manifest).into_iter();
+        let damage = listed.filter_map(|(path, stamp)| {
+            let error = self.check_length(&path, &stamp, files::DATABASE).err()?;
+            Some(Damage { path, error })
+        });
+        damage.chain(self.damage_of_reports(Self::check_length)).collect()
     }
 
     /// Whether every file that `manifest` lists has the bytes it had, and so have the report and what it lists; and no
@@ -83,7 +94,7 @@ impl Folder {
             files += self.list(&self.path(name))?.len();
         }
         let is_whole = |(path, stamp): &(PathBuf, FileStamp)| self.check_file(path, stamp).is_ok();
-        Ok(files == listed.len() && listed.iter().all(is_whole) && self.damage_of_reports().is_empty())
+        Ok(files == listed.len() && listed.iter().all(is_whole) && self.damage_of_reports(Self::check_bytes).is_empty())
     }
 
     /// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
@@ -109,9 +120,22 @@ impl Folder {
         check_stamp(path, &bytes, stamp, files::DATABASE)
     }
 
-    /// The report, where it is not as it was written or of another build, and what it lists that is not as it says. A
-    /// page that it does not list may have been drawn later, and vouches for itself.
-    fn damage_of_reports(&self) -> Vec<Damage> {
+    /// Whether a file has the bytes that the list of this name promises.
+    fn check_bytes(&self, path: &Path, stamp: &FileStamp, list: &str) -> Result<(), DatabaseError> {
+        check_stamp(path, &self.read(path)?, stamp, list)
+    }
+
+    /// The same of its length alone: it is not read.
+    fn check_length(&self, path: &Path, stamp: &FileStamp, list: &str) -> Result<(), DatabaseError> {
+        check_length(&**self.store(), path, stamp, list)
+    }
+
+    /// The report, where it is not as it was written or of another build, and what it lists that is not as it says, as
+    /// `check_listed` finds. A page that it does not list may have been drawn later, and vouches for itself.
+    fn damage_of_reports(
+        &self,
+        check_listed: impl Fn(&Self, &Path, &FileStamp, &str) -> Result<(), DatabaseError>,
+    ) -> Vec<Damage> {
         let found = |name: &str, error| Damage { path: self.path(name), error };
         let report: Beside = match self.read_json(files::REPORT) {
             Ok(report) => report,
@@ -120,7 +144,7 @@ impl Folder {
         let check = |name: &'static str| {
             let path = self.path(name);
             match report.files.get(name) {
-                Some(stamp) => check_stamp(&path, &self.read(&path)?, stamp, files::REPORT),
+                Some(stamp) => check_listed(self, &path, stamp, files::REPORT),
                 None if name == files::REPORT_HTML => match self.read(&path) {
                     Err(DatabaseError::Missing { .. }) => Ok(()),
                     read => check_page(&path, &read?),

@@ -194,7 +194,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    fn judge(&self, report: &Report) -> Outcome {
+    /// How a run ends that has this report.
+    pub fn judge(&self, report: &Report) -> Outcome {
         let (breached, warned) = (!report.breaches.is_empty(), !report.warnings.is_empty());
         match self.arguments.strict {
             true if breached || warned => Outcome::Damaged,

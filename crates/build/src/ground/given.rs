@@ -6,8 +6,8 @@
 use std::path::Path;
 
 use job::{Choice, Job, NamedFile, OuterBorder, Start, StartMethod};
-use source_files::{GivenFeature, GivenShape, RasterFrame, read_given};
-use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, quanta_of_metres};
+use source_files::{GivenFeature, GivenShape, RasterFrame, read_given, short};
+use terrain::{Dem, Importance, Metres, Post, PostRect, THOUSANDTHS, TileId, metres_of_quanta, quanta_of_metres};
 use tin::StartPost;
 use tin::methods::{
     Boundary, Contours, DemWindow, Diagonal, Distance, Extrema, FowlerLittle, Impossible, LatticeTin, Splitting,
@@ -16,6 +16,7 @@ use tin::methods::{
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
 use crate::ground::excluded::{GamingAreaFrame, excluded, inside};
+use crate::ground::relief::Relief;
 
 /// A post that the job gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -30,6 +31,14 @@ pub struct GivenPost {
     pub height: Option<i32>,
 }
 
+/// A height that a file gives.
+struct HeightTold {
+    at: Post,
+    quanta: i32,
+    /// The file, and where in it.
+    place: String,
+}
+
 /// What a job gives for its whole area.
 #[derive(Default)]
 pub struct Given {
@@ -37,6 +46,8 @@ pub struct Given {
     /// Whether the outer border has a point every border step and no others.
     outer_is_fixed: bool,
     posts: Vec<GivenPost>,
+    /// Where the heights of posts come from, in the order of these.
+    heights: Vec<HeightTold>,
     forbidden: Vec<Post>,
     /// Weights are multiplied by so many thousandths inside polygons.
     factors: Vec<(terrain::mask::Polygon, u32)>,
@@ -50,11 +61,6 @@ impl Given {
         border_posts(&self.posts)
     }
 
-    /// Heights that posts are given, in quanta.
-    pub fn heights(&self) -> impl Iterator<Item = i32> {
-        self.posts.iter().filter_map(|given| given.height)
-    }
-
     /// Reads what the job names.
     ///
     /// # Errors
@@ -62,6 +68,9 @@ impl Given {
     pub fn open(job: &Job, area: &GamingArea) -> Result<Self, GroundError> {
         let outer_is_fixed = job.modules.outer_border == OuterBorder::Fixed;
         let mut given = Self { outer_is_fixed, ..Self::default() };
+        if let Some(file) = &job.tin.pins {
+            given.add_pins(job, area, file)?;
+        }
         match &job.tin.start {
             Some(Start::Method { method, points }) => given.start = Some((*method, points.unwrap_or(0))),
             Some(Start::File(file)) => {
@@ -69,14 +78,56 @@ impl Given {
             }
             None => {}
         }
-        if let Some(file) = &job.tin.pins {
-            given.add_pins(job, area, file)?;
-        }
-        // Of two that give one post, pins come before points to start from, and the first of a file before later ones.
-        given.posts.sort_by_key(|post| (post.at, !post.pinned));
+        given.refuse_forbidden(job)?;
+        // Of two that give one post, one with a height comes before one without, pins before points to start from, and
+        // the first of a file before later ones.
+        given.posts.sort_by_key(|post| (post.at, !post.pinned, post.height.is_none()));
         given.posts.dedup_by_key(|post| post.at);
+        given.heights.sort_by_key(|told| told.at);
+        given.heights.dedup_by_key(|told| told.at);
         given.forbidden.sort_unstable();
         Ok(given)
+    }
+
+    /// What a person should know of heights that files give: which lies farthest off the ground there, where that is
+    /// farther than a surface without mistakes leaves its sources. Nothing is known of the sample terrain's.
+    ///
+    /// # Errors
+    /// When the source cannot be read.
+    pub fn far_off(&self, area: &GamingArea, relief: &Relief) -> Result<Option<String>, GroundError> {
+        let Some(bounds) = relief.bounds else { return Ok(None) };
+        let most_m = bounds.far_m();
+        let mut far = Vec::new();
+        for &tile in &area.tiles {
+            // A tile's posts on lines are also its neighbours'.
+            let rect = area.tiling.rect(tile);
+            let here: Vec<&HeightTold> = self.heights.iter().filter(|told| rect.contains(told.at)).collect();
+            if here.is_empty() {
+                continue;
+            }
+            let dem = relief.dem(rect)?;
+            let off_m = |told: &HeightTold| metres_of_quanta(told.quanta) - metres_of_quanta(dem.height(told.at));
+            let known = here.into_iter().filter(|told| !dem.is_void(told.at));
+            far.extend(known.map(|told| (off_m(told), told)).filter(|(off_m, _)| most_m < off_m.abs()));
+        }
+        far.sort_by(|(a, told), (b, other)| b.abs().total_cmp(&a.abs()).then(told.at.cmp(&other.at)));
+        far.dedup_by_key(|(_, told)| told.at);
+        Ok(far.first().map(|(off_m, told)| {
+            let height_m = metres_of_quanta(told.quanta);
+            let way = if *off_m < 0.0 { "below" } else { "above" };
+            let others = match far.len() - 1 {
+                0 => String::new(),
+                others => format!("; {others} more heights lie as far off"),
+            };
+            format!("{}: a height of {height_m:.2} m, {:.2} m {way} the ground there{others}", told.place, off_m.abs())
+        }))
+    }
+
+    /// Keeps in mind a post that a file gives.
+    fn add(&mut self, path: &Path, feature: &GivenFeature, post: GivenPost) {
+        let place = || format!("{}: {}", path.display(), feature.place);
+        self.heights.extend(post.height.map(|quanta| HeightTold { at: post.at, quanta, place: place() }));
+        self.posts.push(post);
     }
 
     fn add_start(&mut self, job: &Job, area: &GamingArea, file: &NamedFile) -> Result<(), GroundError> {
@@ -88,7 +139,7 @@ impl Given {
             let height = height_of(&file.path, &feature)?;
             // What stands at a height of its own is fixed, as is a point on the outer border.
             let outer = is_on_fixed_border(job, area, at);
-            self.posts.push(GivenPost { at, pinned: outer || height.is_some(), outer, height });
+            self.add(&file.path, &feature, GivenPost { at, pinned: outer || height.is_some(), outer, height });
         }
         Ok(())
     }
@@ -99,7 +150,8 @@ impl Given {
             match (feature.pin.as_deref(), feature.shape.clone()) {
                 (Some("add"), GivenShape::Point(at)) => {
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
-                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_fixed_border(job, area, at), height });
+                    let outer = is_on_fixed_border(job, area, at);
+                    self.add(&file.path, &feature, GivenPost { at, pinned: true, outer, height });
                 }
                 (Some("height"), GivenShape::Point(at)) => {
                     if height.is_none() {
@@ -108,7 +160,8 @@ impl Given {
                         return Err(hinted(wrong, hint));
                     }
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
-                    self.posts.push(GivenPost { at, pinned: true, outer: is_on_fixed_border(job, area, at), height });
+                    let outer = is_on_fixed_border(job, area, at);
+                    self.add(&file.path, &feature, GivenPost { at, pinned: true, outer, height });
                 }
                 (Some("forbid"), GivenShape::Point(at)) => {
                     let at = Lattice::of_area(area).post(&file.path, &feature, at)?;
@@ -133,15 +186,35 @@ impl Given {
                 }
             }
         }
-        if let Some(both) = self.posts.iter().find(|post| post.pinned && self.forbidden.contains(&post.at)) {
-            return Err(GroundError::Impossible {
-                key: format!("tin.pins: {}", file.written),
+        // No pin comes before another, and those of one post stand side by side then.
+        self.heights.sort_by_key(|told| told.at);
+        let differ = |pair: &&[HeightTold]| pair[0].at == pair[1].at && pair[0].quanta != pair[1].quanta;
+        self.heights.windows(2).find(differ).map_or(Ok(()), |pair| {
+            let [one, other] = [0, 1].map(|index| metres_of_quanta(pair[index].quanta));
+            Err(GroundError::Impossible {
+                key: pair[1].place.clone(),
+                found: format!(
+                    "a height of {other:.2} m at post {}, where {} has {one:.2} m",
+                    pair[0].at, pair[0].place
+                ),
+                expected: "one height for a post".into(),
+                hint: "remove one of the pins; each is at the post nearest to it".into(),
+            })
+        })
+    }
+
+    /// Refuses to forbid what is given.
+    fn refuse_forbidden(&self, job: &Job) -> Result<(), GroundError> {
+        let both = self.posts.iter().find(|post| post.pinned && self.forbidden.contains(&post.at));
+        both.map_or(Ok(()), |both| {
+            let file = job.tin.pins.as_ref().map_or("", |file| &file.written);
+            Err(GroundError::Impossible {
+                key: format!("tin.pins: {file}"),
                 found: format!("a point to add and a point to forbid at post {}", both.at),
                 expected: "one of the two".into(),
                 hint: "remove one of the pins".into(),
-            });
-        }
-        Ok(())
+            })
+        })
     }
 
     /// Pinned posts of the area, in ascending order.
@@ -290,7 +363,8 @@ impl Lattice {
         let fits = |v: f64| (-1e9..=1e9).contains(&v);
         let post = (fits(row) && fits(col)).then(|| Post::new(row as i32, col as i32));
         post.filter(|&post| self.rect.contains(post)).ok_or_else(|| {
-            let found = format!("a point at {:.1}, {:.1} m, outside the area", at[0], at[1]);
+            let [east, north] = at.map(|metres| short((10.0 * metres).round() / 10.0));
+            let found = format!("a point at {east}, {north} m, outside the area");
             wrong(path, feature, &found, "points inside the area, its border included")
         })
     }
@@ -325,7 +399,7 @@ pub fn posts_of_file(path: &Path, frame: &RasterFrame, rect: PostRect) -> Result
 fn height_of(path: &Path, feature: &GivenFeature) -> Result<Option<i32>, GroundError> {
     let Some(metres) = feature.height_m else { return Ok(None) };
     let quanta = quanta_of_metres(metres);
-    let found = || wrong(path, feature, &format!("a height of {metres} m"), "a height that terrain can have");
+    let found = || wrong(path, feature, &format!("a height of {} m", short(metres)), "a height that terrain can have");
     quanta.map(Some).ok_or_else(found)
 }
 

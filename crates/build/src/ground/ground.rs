@@ -40,6 +40,8 @@ pub struct Ground {
     frame: GridFrame,
     kept: Option<Vec<OnceLock<Arc<Window>>>>,
     lines: OnceLock<Lines>,
+    /// What heights of the sources under the area lie within, as far as its own posts need them.
+    under: Option<Bounds>,
     /// Points that the job gives.
     pub given: Given,
     /// Voids of the source under the area.
@@ -90,10 +92,11 @@ impl Ground {
                 warnings: Vec::new(),
                 accuracy_m: None,
                 range_m: None,
+                under_m: None,
             },
             DemSource::Files { files, .. } => sources::open(job, area, files, workers, stop, whole_bytes_max)?,
         };
-        let Opened { source, voids, mut warnings, accuracy_m, range_m } = opened;
+        let Opened { source, voids, mut warnings, accuracy_m, range_m, under_m } = opened;
         let bounds = range_m.map(Bounds::of_metres);
         warnings.extend(stretched(job.area.epsg, area));
         let mut relief = Relief { source, frame: area.frame, water: None, bounds };
@@ -115,8 +118,11 @@ impl Ground {
         let keep = area.rect.post_count() <= KEPT_POSTS_MAX;
         let kept = keep.then(|| area.tiles.iter().map(|_| OnceLock::new()).collect());
         let (rect, frame, given) = (area.rect, area.frame, Given::open(job, area)?);
+        warnings.extend(given.far_off(area, &relief)?);
         let lines = OnceLock::new();
-        let mut ground = Self { relief, mask, fault, rect, frame, kept, lines, given, voids, warnings, accuracy_m };
+        let under = under_m.map(Bounds::of_metres);
+        let mut ground =
+            Self { relief, mask, fault, rect, frame, kept, lines, under, given, voids, warnings, accuracy_m };
         // One raster knows of its own posts alone what is void.
         if !ground.relief.is_single() || 0 < ground.voids.left {
             ground.take_census(job, area, workers, stop)?;
@@ -175,10 +181,10 @@ impl Ground {
         Ok(Window { given, forbidden: self.given.forbidden(&place, area.tiling.rect(tile)), ..window })
     }
 
-    /// What heights lie within: those of the sources, and what the job says itself of water and points.
+    /// What heights lie within: those of the sources, and what the job says itself of water.
     pub fn bounds(&self) -> Option<Bounds> {
-        let told = self.relief.water.iter().flat_map(Water::levels_known).chain(self.given.heights());
-        self.relief.bounds.map(|bounds| told.fold(bounds, Bounds::and))
+        let levels = self.relief.water.iter().flat_map(Water::levels_known);
+        self.under.map(|bounds| levels.fold(bounds, Bounds::and))
     }
 
     /// Points that the job gives on a fixed outer border of the area.

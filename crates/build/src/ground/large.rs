@@ -4,14 +4,14 @@ use std::sync::atomic::AtomicBool;
 
 use job::{Job, Resampling, SourceFile, Voids};
 use schedule::Workers;
-use source_files::{DemFile, Look, SourceError, WideMosaic, Windows, edge_steps_by_window, window_under};
+use source_files::{DemFile, Look, Reach, SourceError, WideMosaic, Windows, edge_steps_by_window, window_under};
 use terrain::{PostRect, TileId};
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
 use crate::ground::datums::{datum_of, judge_datums};
 use crate::ground::source::{
-    Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, told, union, warnings_of,
+    Decoded, Source, area_crs, mosaic_rules, nothing_reaches, raised, reading, told, warnings_of,
 };
 
 /// Bytes that rasters may take under an area and still be decoded whole.
@@ -51,9 +51,9 @@ pub fn open(
         return Ok(None);
     }
     let (mut used, mut datums, mut accuracy_m, mut all) = (Vec::new(), Vec::new(), None, Look::default());
-    let mut ranges_m = Vec::new();
+    let (mut ranges_m, mut reached_m) = (Vec::new(), Vec::new());
     for (index, one) in reaching.iter().enumerate() {
-        let look = look(one, workers, stop)?;
+        let look = look(one, &one.file.reach(&crs, &area.frame, area.rect), workers, stop)?;
         if look.voids == look.posts {
             let path = one.named.path.display();
             warnings.push(format!("{path}: all its posts in the area are void, so it is not used"));
@@ -65,7 +65,8 @@ pub fn open(
         datums.push((one.named, datum_of(one.named, &one.file)));
         // What is not all void has a range.
         let range_m = look.range_m.unwrap_or((0.0, 0.0));
-        ranges_m.push(range_m);
+        ranges_m.push(Some(range_m));
+        reached_m.push(look.reached_m);
         all.add(Look { notes: Vec::new(), ..look });
         used.push((index, range_m.0));
     }
@@ -78,9 +79,7 @@ pub fn open(
     drop(datums);
     warnings.extend(judged.warnings);
     let is_alone = judged.shifts.iter().all(Option::is_none) && is_alone(job, area, &reaching, &all)?;
-    let ranges =
-        ranges_m.into_iter().zip(&judged.shifts).map(|(range_m, shift)| raised(range_m, shift.as_ref(), area, &crs));
-    let range_m = ranges.reduce(union);
+    let [range_m, under_m] = [ranges_m, reached_m].map(|ranges_m| raised(ranges_m, &judged.shifts, (area, &crs)));
     for (&(index, _), shift) in used.iter().zip(judged.shifts) {
         reaching[index].file.set_shift(shift);
     }
@@ -96,7 +95,7 @@ pub fn open(
             Source::Wide(Box::new(WideMosaic::new(windows, &used, mosaic_rules(job), place)?))
         }
     };
-    Ok(Some(Decoded { source, warnings, accuracy_m, range_m }))
+    Ok(Some(Decoded { source, warnings, accuracy_m, range_m, under_m }))
 }
 
 /// Whether there is one raster, on the area's own system, whose posts need no projecting and none of which is void.
@@ -121,12 +120,12 @@ fn is_alone(job: &Job, area: &GamingArea, reaching: &[Reaching], look: &Look) ->
 }
 
 /// Looks at every post of a raster under the area, on all workers.
-fn look(one: &Reaching, workers: &Workers, stop: &AtomicBool) -> Result<Look, GroundError> {
+fn look(one: &Reaching, reach: &Reach, workers: &Workers, stop: &AtomicBool) -> Result<Look, GroundError> {
     const PARTS_A_WORKER: usize = 16;
     let chunks = one.file.chunks_of(one.window);
     let parts: Vec<&[u32]> = chunks.chunks(chunks.len().div_ceil(PARTS_A_WORKER * workers.count()).max(1)).collect();
     let looks = schedule::for_each_independent(&parts, workers, stop, |_, part| {
-        one.file.look(one.window, part).map_err(GroundError::from)
+        one.file.look(one.window, Some(reach), part).map_err(GroundError::from)
     });
     let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
     let looks = looks.map_err(|error| GroundError::from_schedule(&nowhere, error))?;

@@ -7,7 +7,7 @@ pub use error::GroundError;
 mod area;
 pub use area::{GamingArea, PlannedTile, planned_tiles};
 mod relief;
-pub use relief::{Bounds, Relief};
+pub use relief::{Bounds, Relief, far_m};
 mod burn;
 pub use burn::{burn, posts_inside, roadside_reach, waterside_reach};
 mod buildings;

@@ -187,6 +187,11 @@ impl Bounds {
         metres(outside.max(0))
     }
 
+    /// How far a surface leaves its sources only where something is wrong, in metres. Fitted heights stay nearer.
+    pub fn far_m(self) -> f64 {
+        far_m(self.metres().into())
+    }
+
     /// The bounds in metres.
     pub fn metres(self) -> (f64, f64) {
         (metres(self.lowest.into()), metres(self.highest.into()))
@@ -203,6 +208,11 @@ impl Bounds {
         let found_m = (metres(lowest.into()), metres(highest.into()));
         Err(GroundError::OutsideSources { found_m, expected_m: self.metres() })
     }
+}
+
+/// The same of a range of heights in metres.
+pub fn far_m([low, high]: [f64; 2]) -> f64 {
+    (0.2 * (high - low)).max(10.0)
 }
 
 fn metres(quanta: i64) -> f64 {

@@ -33,19 +33,23 @@ pub struct Decoded<S> {
     pub warnings: Vec<String>,
     /// Vertical accuracy of the least accurate, in metres.
     pub accuracy_m: Option<f64>,
-    /// Lowest and highest height, in metres.
+    /// Lowest and highest height that was read, in metres.
     pub range_m: Option<(f64, f64)>,
+    /// The same of posts that the area's own lie among.
+    pub under_m: Option<(f64, f64)>,
 }
 
-/// A range of heights, once they are brought to another datum.
-pub fn raised((low, high): (f64, f64), shift: Option<&DatumShift>, area: &GamingArea, crs: &Crs) -> (f64, f64) {
-    let (least, most) = shift.map_or((0.0, 0.0), |shift| shift.range_m(crs, &area.frame, area.rect));
-    (low + least, high + most)
-}
-
-/// The range of what lies in either of two.
-pub fn union((low, high): (f64, f64), (lower, higher): (f64, f64)) -> (f64, f64) {
-    (low.min(lower), high.max(higher))
+/// The range of all of some ranges of heights, once each is brought to another datum.
+pub fn raised(
+    ranges_m: impl IntoIterator<Item = Option<(f64, f64)>>,
+    shifts: &[Option<DatumShift>],
+    (area, crs): (&GamingArea, &Crs),
+) -> Option<(f64, f64)> {
+    let each = ranges_m.into_iter().zip(shifts).filter_map(|(range_m, shift)| {
+        let shift_m = shift.as_ref().map_or((0.0, 0.0), |shift| shift.range_m(crs, &area.frame, area.rect));
+        range_m.map(|(low, high)| (low + shift_m.0, high + shift_m.1))
+    });
+    each.reduce(|(low, high), (lower, higher)| (low.min(lower), high.max(higher)))
 }
 
 pub fn nothing_reaches() -> GroundError {

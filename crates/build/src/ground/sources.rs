@@ -9,7 +9,7 @@ use source_files::{DemFile, Mosaic, Raster, SourceError, VoidPolicy, VoidSummary
 use crate::ground::area::GamingArea;
 use crate::ground::datums::{Datums, datum_of, judge_datums};
 use crate::ground::source::{
-    Decoded, Source, area_crs, decode, mosaic_rules, nothing_reaches, raised, reading, told, union, warnings_of,
+    Decoded, Source, area_crs, decode, mosaic_rules, nothing_reaches, raised, reading, told, warnings_of,
 };
 use crate::ground::{GroundError, large};
 
@@ -19,8 +19,10 @@ pub struct Opened {
     pub voids: VoidSummary,
     pub warnings: Vec<String>,
     pub accuracy_m: Option<f64>,
-    /// Between what the heights of the sources lie under the area, in metres above the job's datum.
+    /// Between what the heights lie that were read of the sources, in metres above the job's datum.
     pub range_m: Option<(f64, f64)>,
+    /// The same of posts that the area's own lie among.
+    pub under_m: Option<(f64, f64)>,
 }
 
 /// Opens, judges and decodes the files of a job.
@@ -36,17 +38,19 @@ pub fn open(
     whole_bytes_max: u64,
 ) -> Result<Opened, GroundError> {
     let voids = VoidSummary::default();
-    if let Some(Decoded { source, warnings, accuracy_m, range_m }) =
-        large::open(job, area, files, (workers, stop), whole_bytes_max)?
-    {
-        return Ok(Opened { source, voids, warnings, accuracy_m, range_m });
+    if let Some(decoded) = large::open(job, area, files, (workers, stop), whole_bytes_max)? {
+        return Ok(opened(decoded, |source| source, voids));
     }
     if let Some((decoded, voids)) = open_alone(job, area, files, workers, stop)? {
-        let Decoded { source, warnings, accuracy_m, range_m } = decoded;
-        return Ok(Opened { source: Source::Raster(Box::new(source)), voids, warnings, accuracy_m, range_m });
+        return Ok(opened(decoded, |source| Source::Raster(Box::new(source)), voids));
     }
-    let Decoded { source, warnings, accuracy_m, range_m } = open_mosaic(job, area, files, workers, stop)?;
-    Ok(Opened { source: Source::Mosaic(Box::new(source)), voids, warnings, accuracy_m, range_m })
+    let decoded = open_mosaic(job, area, files, workers, stop)?;
+    Ok(opened(decoded, |source| Source::Mosaic(Box::new(source)), voids))
+}
+
+fn opened<S>(decoded: Decoded<S>, source: impl FnOnce(S) -> Source, voids: VoidSummary) -> Opened {
+    let Decoded { source: of, warnings, accuracy_m, range_m, under_m } = decoded;
+    Opened { source: source(of), voids, warnings, accuracy_m, range_m, under_m }
 }
 
 /// One raster on the area's own system whose posts need no projecting; `None` where that is not so.
@@ -87,7 +91,8 @@ fn open_alone(
     }
     warnings.append(&mut raster_warnings(&raster));
     let (accuracy_m, range_m) = (opened.accuracy_m(), raster.range_m());
-    Ok(Some((Decoded { source: raster, warnings, accuracy_m, range_m }, voids)))
+    // It was read as far as the area's posts need it.
+    Ok(Some((Decoded { source: raster, warnings, accuracy_m, range_m, under_m: range_m }, voids)))
 }
 
 fn open_mosaic(
@@ -99,7 +104,7 @@ fn open_mosaic(
 ) -> Result<Decoded<Mosaic>, GroundError> {
     let crs = area_crs(job)?;
     let (mut rasters, mut warnings, mut accuracy_m) = (Vec::new(), Vec::new(), None);
-    let mut datums = Vec::new();
+    let (mut datums, mut reached_m) = (Vec::new(), Vec::new());
     for file in files {
         let opened = DemFile::open(&file.path, &reading(file, job.dem.strict)?)?;
         let path = file.path.display();
@@ -118,15 +123,13 @@ fn open_mosaic(
         warnings.extend(raster_warnings(&raster));
         accuracy_m = [accuracy_m, opened.accuracy_m()].into_iter().flatten().reduce(f64::max);
         datums.push((file, datum_of(file, &opened)));
+        reached_m.push(raster.range_within_m(&opened.reach(&crs, &area.frame, area.rect)));
         rasters.push(raster);
     }
     let mut judged = judge_datums(job, area, &datums)?;
     warnings.append(&mut judged.warnings);
-    let ranges = rasters
-        .iter()
-        .zip(&judged.shifts)
-        .filter_map(|(raster, shift)| Some(raised(raster.range_m()?, shift.as_ref(), area, &crs)));
-    let range_m = ranges.reduce(union);
+    let range_m = raised(rasters.iter().map(Raster::range_m), &judged.shifts, (area, &crs));
+    let under_m = raised(reached_m, &judged.shifts, (area, &crs));
     rasters.iter_mut().zip(judged.shifts).for_each(|(raster, shift)| raster.set_shift(shift));
     if let ([file], true) = (files, rasters.is_empty()) {
         return Err(SourceError::OutsideArea { path: file.path.clone() }.into());
@@ -137,7 +140,7 @@ fn open_mosaic(
     let steps = edge_steps(&rasters, (&crs, &area.frame, area.rect), 0.0 < job.dem.feather_m);
     warnings.extend(steps.iter().filter_map(|step| told(step, |place| rasters[place].frame())));
     let source = Mosaic::new(rasters, mosaic_rules(job), &crs, &area.frame, area.rect)?;
-    Ok(Decoded { source, warnings, accuracy_m, range_m })
+    Ok(Decoded { source, warnings, accuracy_m, range_m, under_m })
 }
 
 fn raster_warnings(raster: &Raster) -> Vec<String> {

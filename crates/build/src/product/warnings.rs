@@ -10,6 +10,7 @@ use std::collections::BTreeSet;
 use job::Job;
 use store::{AreaLevel, FeatureAmounts, FeatureRemark, ObjectSums, Report, ReportDeckClearance};
 
+use crate::ground::far_m;
 use crate::product::earthworks;
 
 /// What a build made, as far as warnings need it.
@@ -46,7 +47,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 22] = [
+pub(crate) const MATTERS: [Matter; 23] = [
     matter(
         "files, datums, holes and rules of sources, or metres of the area's system, that are not as they should be",
         Told::OfStage,
@@ -72,7 +73,12 @@ pub(crate) const MATTERS: [Matter; 22] = [
     matter(
         "the surface reaches beyond the heights of its sources by 10 m and a fifth of their range",
         Told::Warning(beyond_sources),
-        "a wrong level or a deep cut does that; fitted heights do not",
+        "a wrong level, a deep cut or a wrong pin does that; fitted heights do not",
+    ),
+    matter(
+        "heights of pins or of points to start from that lie as far off the ground there",
+        Told::OfStage,
+        "a digit too many does that; the farthest is named with its place in the file",
     ),
     matter(
         "features take the surface far from its sources: the RMS against them is a metre and twice that outside \
@@ -307,16 +313,15 @@ fn earthworks(made: &Made) -> Vec<String> {
     made.features.map_or_else(Vec::new, |(job, level)| earthworks::warnings(&job.class_names(), level))
 }
 
-/// Roads and water take the surface beyond the heights of the sources, further than fitted heights do.
+/// Roads, water or points take the surface beyond the heights of the sources, further than fitted heights do.
 fn beyond_sources(made: &Made) -> Vec<String> {
-    // A guard of its own, in jobs with features: it knows the sources' heights and no other.
-    let heights = made.report.heights.filter(|_| made.report.features.is_some());
-    let found = heights.and_then(|heights| {
+    // A guard of its own: it knows the sources' heights and no other.
+    let found = made.report.heights.and_then(|heights| {
         let [low, high] = heights.sources_m?;
-        (0.2 * (high - low)).max(10.0).lt(&heights.outside_m).then(|| {
+        far_m([low, high]).lt(&heights.outside_m).then(|| {
             format!(
                 "the surface reaches {:.2} m beyond the heights of the sources, {low:.2} m to {high:.2} m: a wrong \
-                 level or a deep cut may do that, and tiefort render --view residual shows where",
+                 level, a deep cut or a wrong pin may do that, and tiefort render --view residual shows where",
                 heights.outside_m
             )
         })

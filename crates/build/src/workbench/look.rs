@@ -298,7 +298,7 @@ fn open(path: &Path, given: Option<&str>, nodata: Option<f64>) -> Result<(DemFil
 /// Looks at every post of a raster, as a build would read it with the job that is suggested.
 fn look(path: &Path, given: Option<&str>) -> Result<(Seen, RasterFrame), CompileError> {
     let (mut file, crs_given) = open(path, given, None)?;
-    let all = |file: &DemFile| file.look(file.rect(), &file.chunks_of(file.rect()));
+    let all = |file: &DemFile| file.look(file.rect(), None, &file.chunks_of(file.rect()));
     let mut found = all(&file);
     let undeclared = match &found {
         // One value marks voids: that which the file declares, where it has it.

@@ -7,7 +7,7 @@ use store::Folder;
 use terrain::{LatticePoint, Post, TileTin, Vertex};
 
 use crate::product::{Edges, Product};
-use crate::scene::{Draw, ORIGIN_M, SIDE_CELLS, Scene, Words, differing, tile};
+use crate::scene::{Draw, ORIGIN_M, SIDE_CELLS, Scene, Words, differing, sample_dem, tile};
 
 const CONSTRAINED: &str = "method = \"greedy\"";
 const PAPER: &str = "method = \"paper\"\npoints = 900";
@@ -266,6 +266,46 @@ fn what_no_pin_may_be_is_told_with_its_place_in_the_file() {
         &pinned(CONSTRAINED, &[("add", 7, 7, ""), ("forbid", 7, 7, "")]),
         "at post 7,7, expected one of the two",
     );
+    let other = [("height", 7, 7, r#","height_m":600"#), ("add", 9, 9, ""), ("height", 7, 7, r#","height_m":700"#)];
+    let scene = pinned(CONSTRAINED, &other);
+    let file = scene.path("pins.geojson");
+    check_refused(&scene, "feature 0 has 600.00 m, expected one height for a post");
+    let error = scene.try_build("a.tdb", 1).unwrap_err().to_string();
+    assert!(
+        error.starts_with(&format!("{}: feature 2: a height of 700.00 m at post 7,7, where", file.display())),
+        "{error}"
+    );
+}
+
+#[test]
+fn pins_at_one_post_agree_where_they_say_the_same_or_only_one_says_a_height() {
+    let height = ("height", 31, 33, r#","height_m":900"#);
+    let scene = pinned(CONSTRAINED, &[("add", 31, 33, ""), height, height]);
+    scene.build("a.tdb", 2);
+    assert!(vertices(&scene, "a.tdb").contains(&(Post::new(31, 33), 900 * 128)));
+}
+
+#[test]
+fn a_pin_far_off_the_ground_is_a_warning_that_names_it() {
+    let words = Words { dem: "sources = [\"dem.tif\"]".into(), ..words("pins = \"pins.geojson\"") };
+    let dem = sample_dem(words.grid(), 1);
+    let ground_m = terrain::metres_of_quanta(dem.height(Post::new(31, 33)));
+    let warnings = |height_m: f64| {
+        let scene = Scene::on(&words, &dem);
+        let said = format!(r#","height_m":{height_m}"#);
+        write_pins(&scene.path("pins.geojson"), &[("add", 7, 7, ""), ("height", 31, 33, &said)]);
+        let report = scene.build("a.tdb", 2).report;
+        let [low_m, high_m] = report.heights.unwrap().sources_m.unwrap();
+        assert!(low_m < ground_m && high_m < 7120.0, "a pin is no source");
+        report.warnings
+    };
+    assert_eq!(warnings(ground_m + 5.0), Vec::<String>::new());
+    let [beyond, far] = &warnings(7120.0)[..] else { panic!("expected two warnings") };
+    let (beyond, far) = if far.contains("feature 1") { (beyond, far) } else { (far, beyond) };
+    assert!(beyond.contains("beyond the heights of the sources"), "{beyond}");
+    let off =
+        format!("pins.geojson: feature 1: a height of 7120.00 m, {:.2} m above the ground there", 7120.0 - ground_m);
+    assert!(far.ends_with(&off), "{far}");
 }
 
 #[test]

@@ -1,13 +1,16 @@
 //! One tile run again: with the same DEM, with a changed one, with its borders frozen or released.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::AtomicBool;
 
+use build::product::WantedGround;
+use job::Job;
 use store::TileState;
-use terrain::{Dem, Post, TileId};
+use terrain::{Dem, ModuleId, Post, TileId};
 
 use crate::modes;
 use crate::product::Product;
-use crate::scene::{Draw, SIDE_CELLS, Scene, Words, assert_same, differing, options, sample_dem, tile};
+use crate::scene::{Draw, SIDE_CELLS, Scene, Silent, Words, assert_same, differing, options, sample_dem, tile};
 
 /// Equal allocation: what a tile may spend does not depend on what the DEM of another holds, so a tile that is run
 /// again can have the bytes of a fresh build. With a survey the fresh build would share its budget anew.
@@ -182,12 +185,59 @@ fn until_a_build_has_renewed_the_rest_none_says_that_nothing_changed() {
         scene.tile("area", again, true);
         assert!(store::Folder::new(scene.path("area")).report().unwrap().outdated, "{again}");
     }
+    check_outdated(&scene, true);
     let built = scene.build("area", 2);
     assert!(!built.is_unchanged && !built.report.outdated);
     drop(built);
     assert!(scene.build("area", 2).is_unchanged);
+    check_outdated(&scene, false);
     drop(scene.build("fresh", 2));
     assert_same(&scene.product("fresh"), &scene.product("area"), "after the next build");
+}
+
+/// Whether all that hold tiles against their ground say that some are of other ground.
+#[track_caller]
+fn check_outdated(scene: &Scene, expected: bool) {
+    let area = scene.path("area");
+    assert_eq!(inspect::status(&area).unwrap().is_outdated, expected);
+    assert_eq!(inspect::inadequate(&area, None).unwrap().is_outdated, expected);
+    let sights = inspect::Sights { pairs: 100, seed: 1 };
+    assert_eq!(inspect::fidelity(&area, None, sights).unwrap().is_outdated, expected);
+}
+
+#[test]
+fn a_job_with_other_keys_is_refused_with_the_first_of_them() {
+    let tin = "effort = \"fast\"";
+    let scene = Scene::on(&Words { tin: tin.into(), ..Words::raster() }, &ground());
+    drop(scene.build("area", 2));
+    for (tin, expected) in [
+        (format!("{tin}\ntarget_rms_m = 3"), "`target_rms_m = 3` here alone"),
+        (tin.replace("fast", "best"), "`effort = \"fast\"` there, `effort = \"best\"` here"),
+    ] {
+        let text = Words { tin, ..Words::raster() }.text();
+        let job = Job::from_text(&text, &scene.path("job.toml")).unwrap();
+        let (area, stop) = (scene.path("area"), AtomicBool::new(false));
+        let error = build::rebuild_tile(&job, &area, tile(0, 0), false, &options(1, &stop), &mut Silent).unwrap_err();
+        assert!(error.to_string().ends_with(expected), "{error}");
+    }
+}
+
+#[test]
+fn one_more_point_is_not_tried_on_ground_that_a_load_module_was_not_made_from() {
+    let words = Words::raster();
+    let (dem, scene) = (ground(), Scene::on(&words, &ground()));
+    drop(scene.build("area", 2));
+    std::fs::copy(scene.path("dem.tif"), scene.path("old.tif")).unwrap();
+    scene.replace_dem(&Dem::from_fn(dem.rect(), |post| Some(dem.height(post) + 30 * 128)));
+    scene.tile("area", tile(0, 0), true);
+    let explain = |module, against: WantedGround| inspect::explain(&scene.path("area"), module, against, 1).unwrap();
+    let [near, far] = [ModuleId { row: 0, col: 0 }, ModuleId { row: 8, col: 9 }];
+    assert!(explain(near, WantedGround::Recorded).one_more.is_some());
+    let found = explain(far, WantedGround::Recorded);
+    assert!(found.one_more.is_none() && found.no_ground.unwrap().contains("`tiefort build`"));
+    let [old, new] = ["old.tif", "dem.tif"]
+        .map(|name| explain(far, WantedGround::Raster(&scene.path(name))).one_more.unwrap().rms_before_m);
+    assert!(old < 10.0 && 25.0 < new, "{old} {new}");
 }
 
 #[test]

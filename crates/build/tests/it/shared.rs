@@ -95,7 +95,7 @@ fn who_comes_to_a_finished_build_removes_what_the_process_that_published_left() 
         std::fs::write(done.join("allocate"), b"0").unwrap();
         std::fs::write(area.join(".tiefort-x.part"), b"half").unwrap();
         let end = perform(&scene, &[unit]).unwrap();
-        assert!(matches!(end, UnitEnd::Finished), "{unit}: {end:?}");
+        assert!(matches!(end, UnitEnd::Finished(_)), "{unit}: {end:?}");
         assert!(!area.join("work").exists() && !area.join(".tiefort-x.part").exists(), "{unit}");
         assert_same(&scene.product("alone"), &scene.product("area"), "after it was swept");
     }
@@ -177,7 +177,8 @@ fn as_long_as_a_slow_worker_is_there_no_build_of_another_job_begins() {
     let clock = SetBy(clock);
     let options = Options { clock: &clock, ..options(1, &stop) };
     let end = build::work(&first.job, &folder, &options, &sharing, &mut read).unwrap();
-    assert!(!is_first.load(Ordering::Relaxed) && end.units == 0 && end.published.is_none(), "{end:?}");
+    assert!(!is_first.load(Ordering::Relaxed) && end.units == 0 && end.built.is_unchanged, "{end:?}");
+    drop(end);
     survey_in(&folder, &next.job);
     finish_in(&folder, &next.job, || ());
     assert_same(&next.product("area"), &first.product("area"), "the second job");
@@ -194,7 +195,7 @@ fn workers_side_by_side_give_the_bytes_of_a_build() {
             Sharing { name, lease: Duration::from_secs(3600), pause: Duration::from_millis(1), holding: &|_| {} };
         let options = options(1, &stop);
         let end = build::work(&scene.job, &scene.path("area"), &options, &sharing, &mut Silent).unwrap();
-        (end.units, end.published.is_some())
+        (end.units, !end.built.is_unchanged)
     };
     let ends = std::thread::scope(|scope| {
         let started = ["one", "two", "three"].map(|name| scope.spawn(move || work(name)));

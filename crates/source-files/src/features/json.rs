@@ -5,7 +5,7 @@ use geojson::{Feature, GeoJson, JsonValue};
 use super::columns::{Texts, with_packed_tags};
 use super::loose::{self, Loose};
 use super::model::{FeatureFile, Wanted, file_name};
-use super::placing::{LEFT_OUT, Placing, look_like_degrees};
+use super::placing::{Placing, look_like_degrees};
 use super::raw::RawFeature;
 use super::strict::{self, said_by, said_in, shape_of};
 use crate::SourceError;
@@ -48,8 +48,15 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     }
     let all = raw.iter().flat_map(|feature| feature.shape.vertices());
     let said = said.or_else(|| look_like_degrees(all).then(Crs::wgs84));
+    let is_assumed = said.is_none() && raw.iter().any(|feature| feature.shape.vertices().next().is_some());
     let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
-    faults.into_iter().for_each(|(id, found)| placing.remark(&id, None, found, LEFT_OUT));
+    if is_assumed {
+        placing.note_assumed_system();
+    }
+    for (id, found) in faults {
+        placing.count_left_out();
+        placing.leave_out(&id, found);
+    }
     texts.count(placing.allowance());
     raw.into_iter().for_each(|feature| placing.place(feature));
     placing.finish(None)

@@ -117,12 +117,16 @@ fn add_polygon(rings: &[JsonValue], shape: &mut RawShape) -> Result<(), String> 
     Ok(())
 }
 
-/// What is no number is not a number: a place there is not on the Earth, a height is none.
+/// A height that is no number is none.
 fn vertices(places: &[JsonValue], shape: &mut RawShape) -> Result<Vec<Vertex>, String> {
     let vertex = |place: &JsonValue| {
         let numbers = place.as_array().ok_or_else(|| "a place that is none".to_owned())?;
         shape.has_heights |= 2 < numbers.len();
-        Ok([0, 1, 2].map(|axis: usize| numbers.get(axis).and_then(JsonValue::as_f64).unwrap_or(f64::NAN)))
+        let number = |axis: usize| match numbers.get(axis) {
+            Some(value) => value.as_f64().ok_or_else(|| format!("a coordinate {value}, expected a number")),
+            None => Ok(f64::NAN),
+        };
+        Ok([number(0)?, number(1)?, number(2).unwrap_or(f64::NAN)])
     };
     places.iter().map(vertex).collect()
 }

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use super::clip::{self, Extent, Vertex};
 use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 use super::raw::{Part, RawFeature};
-use crate::SourceError;
 use crate::crs::Crs;
 use crate::limits::{Allowance, HEIGHT_M_MAX, REMARKS_MAX, VERTEX_BYTES};
 use crate::polygons::pieces_of;
+use crate::{SourceError, short};
 
 /// Whether most places can only be degrees; what nothing is said about is taken for WGS 84 then.
 pub(super) fn look_like_degrees<'v>(vertices: impl Iterator<Item = &'v Vertex>) -> bool {
@@ -37,6 +37,8 @@ pub(super) struct Placing {
     remarks_beyond: u64,
     /// Lines and polygons with a vertex that is not on the Earth.
     off_the_earth: u64,
+    /// Lines and polygons that are none, and what was found of the first.
+    unsound: (u64, Option<String>),
     /// Of the whole file, whose parts share it.
     allowance: Arc<Allowance>,
     file: FeatureFile,
@@ -64,6 +66,7 @@ impl Placing {
             points: wanted.points,
             remarks_beyond: 0,
             off_the_earth: 0,
+            unsound: (0, None),
             allowance: Arc::new(Allowance::new(path, file_bytes)),
             file,
         })
@@ -77,6 +80,7 @@ impl Placing {
             lies: Extent::NOTHING,
             remarks_beyond: 0,
             off_the_earth: 0,
+            unsound: (0, None),
             allowance: self.allowance.clone(),
             file: FeatureFile::default(),
             ..*self
@@ -93,6 +97,8 @@ impl Placing {
         self.lies_over(&part.lies);
         self.remarks_beyond += part.remarks_beyond;
         self.off_the_earth += part.off_the_earth;
+        self.unsound.0 += part.unsound.0;
+        self.unsound.1 = self.unsound.1.take().or(part.unsound.1);
         let FeatureFile { mut features, remarks, notes, found, outside, attribution: _, buildings: _ } = part.file;
         self.file.features.append(&mut features);
         self.file.notes.extend(notes);
@@ -147,6 +153,22 @@ impl Placing {
         self.file.found += 1;
     }
 
+    /// Tells of a feature, counted already, that is no line or polygon in numbers.
+    pub(super) fn leave_out(&mut self, id: &str, found: String) {
+        self.remark(id, None, found.clone(), LEFT_OUT);
+        self.unsound.1.get_or_insert(found);
+        self.unsound.0 += 1;
+    }
+
+    /// Tells that the file is taken to be in the area's system, as nothing says otherwise.
+    pub(super) fn note_assumed_system(&mut self) {
+        let area = self.area.name();
+        self.note(format!(
+            "it names no coordinate system and its numbers are no degrees: they are taken for metres of {area}; crs \
+             names another"
+        ));
+    }
+
     /// Where a vertex of the file lies, for remarks.
     pub(super) fn at(&self, vertex: &Vertex) -> Option<[f64; 2]> {
         let place = [vertex[0], vertex[1]];
@@ -188,7 +210,10 @@ impl Placing {
         }
         self.file.found += 1;
         if let Some(vertex) = shape.vertices().find(|vertex| !self.is_on_earth(vertex)) {
-            let [east, north] = [vertex[0], vertex[1]].map(coordinate);
+            let [east, north] = [vertex[0], vertex[1]].map(short);
+            if vertex[0].is_nan() || vertex[1].is_nan() {
+                return self.leave_out(&id, format!("a vertex at {east}, {north}, expected two numbers"));
+            }
             let found = format!("a vertex at {east}, {north}, which is not on the Earth");
             self.off_the_earth += 1;
             return self.remark(&id, None, found, LEFT_OUT);
@@ -395,6 +420,11 @@ impl Placing {
             let note = format!("{count} of its {found} lines and polygons reach beyond the Earth and are left out");
             self.file.notes.push(note);
         }
+        if let (count, Some(first)) = &self.unsound {
+            let found = self.file.found;
+            let note = format!("{count} of its {found} lines and polygons are left out; the first has {first}");
+            self.file.notes.push(note);
+        }
         if self.file.found == 0 {
             self.file.notes.push("no line or polygon in the file".into());
         } else if self.file.features.is_empty() && 0 < self.file.outside {
@@ -434,11 +464,6 @@ impl Part {
             Part::Polygon(rings) => rings.iter_mut().flatten().for_each(|vertex| vertex[0] += by),
         }
     }
-}
-
-/// A coordinate in a few characters, whatever it is.
-fn coordinate(number: f64) -> String {
-    if number.abs() < 1e12 || number.is_nan() { number.to_string() } else { format!("{number:e}") }
 }
 
 fn counted(vertices: usize) -> String {

@@ -284,6 +284,46 @@ fn a_window_of_a_mosaic_equals_the_same_posts_of_the_whole() {
 }
 
 #[test]
+fn areas_have_the_same_heights_where_they_have_the_same_posts() {
+    let folder = Folder::new();
+    let files = [open(&write_hgt(&folder))];
+    let rect = PostRect::of_size(241, 241);
+    let patch = |east: f64, north: f64| mosaic(&files, PLAIN, &grid(east, north, 25.0), rect).unwrap().resample(rect);
+    // 200 and 111 posts apart, which is no multiple of the posts between projected ones.
+    let (one, other) = (patch(510_000.0, 3_900_000.0), patch(515_000.0, 3_902_775.0));
+    for (row, col) in (0..=129).flat_map(|row| (0..=40).map(move |col| (row, col))) {
+        assert_eq!(metres(&one, row + 111, col + 200), metres(&other, row, col), "{row},{col}");
+    }
+}
+
+#[test]
+fn posts_that_an_area_lies_among_reach_one_post_beyond_it() {
+    let folder = Folder::new();
+    let file = open(&write_hgt(&folder));
+    // Rows run 0.4 degrees off those of the raster.
+    let (grid, rect) = (grid(560_000.0, 3_900_000.0, 25.0), PostRect::of_size(401, 321));
+    let raster = file.read(file.window_reaching(&utm(), &grid, rect).unwrap()).unwrap();
+    let (frame, own) = (raster.frame(), raster.window());
+    let range_within = |more_m: f64| {
+        let posts = (own.south..=own.north).flat_map(|row| (own.west..=own.east).map(move |col| Post::new(row, col)));
+        let is_inside = |post: &Post| {
+            let at = [(0, post.col), (1, post.row)]
+                .map(|(axis, at)| frame.south_west[axis] + f64::from(at) * frame.spacing[axis]);
+            let [east, north] = frame.crs.to(&utm(), at).unwrap();
+            let is_within = |off: f64, cells: f64| -more_m <= off && off <= 25.0 * cells + more_m;
+            is_within(east - grid.origin_east_m, 320.0) && is_within(north - grid.origin_north_m, 400.0)
+        };
+        let heights = posts.filter(is_inside).map(|post| raster.height_m(post).unwrap());
+        heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), height| (low.min(height), high.max(height)))
+    };
+    let (low, high) = raster.range_within_m(&file.reach(&utm(), &grid, rect)).unwrap();
+    // Posts lie 76 and 93 m apart; a post across a corner lies farther off.
+    let (least, most) = (range_within(0.0), range_within(125.0));
+    assert!(low <= least.0 && least.1 <= high && most.0 <= low && high <= most.1, "{least:?} {low} {high} {most:?}");
+    assert!(most != raster.range_m().unwrap() && (low, high) != raster.range_m().unwrap());
+}
+
+#[test]
 fn a_raster_beyond_the_date_line_or_the_area_is_found_or_not() {
     let grid = grid(500_000.0, 3_929_000.0, 25.0);
     let rect = PostRect::of_size(41, 41);

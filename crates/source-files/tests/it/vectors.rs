@@ -86,6 +86,14 @@ fn polygons_in_the_areas_metres_keep_their_holes_and_heights() {
 }
 
 #[test]
+fn numbers_that_are_no_degrees_are_metres_of_the_area_and_that_is_told() {
+    let square = format!(r#"{{"type":"Polygon","coordinates":[{SQUARE}]}}"#);
+    let [note] = &json(&[(&square, "")]).notes[..] else { panic!("expected one note") };
+    assert!(note.starts_with("it names no coordinate system") && note.contains("metres of EPSG:32611"), "{note}");
+    assert_eq!(json(&[(LINE, "")]).notes, [""; 0]);
+}
+
+#[test]
 fn an_empty_collection_is_told_and_no_error() {
     let file = json(&[]);
     assert_eq!((file.features.len(), file.notes), (0, vec!["no line or polygon in the file".to_owned()]));
@@ -101,7 +109,7 @@ fn a_feature_off_the_earth_is_left_out_and_the_others_are_still_in_degrees() {
         remarks(&file),
         [
             "roads.geojson#1: a vertex at -117, 95, which is not on the Earth (left out)",
-            "roads.geojson#2: a vertex at -117, NaN, which is not on the Earth (left out)",
+            "roads.geojson#2: a vertex at -117, NaN, expected two numbers (left out)",
         ]
     );
 }
@@ -260,18 +268,22 @@ fn a_number_that_is_none_costs_its_own_feature_of_geojson_alone() {
         r#"{"type":"Line"}"#.into(),
         "7".into(),
         r#"{"type":"LineString","coordinates":[7]}"#.into(),
+        line(r#"["a",35],[-117,35]"#),
         LINE.into(),
     ]);
     let all: Vec<(&str, &str)> = all.iter().map(|geometry| (geometry.as_str(), r#""highway":"track""#)).collect();
     let file = json(&all);
-    assert_eq!(ids(&file), ["roads.geojson#0", "roads.geojson#6"]);
+    assert_eq!(ids(&file), ["roads.geojson#0", "roads.geojson#7"]);
+    let note = "6 of its 8 lines and polygons are left out; the first has a coordinate null, expected a number";
+    assert_eq!(file.notes, [note]);
 
     assert_eq!(sizes(&file.features[0]), (vec![2], vec![None, Some(7.0)]));
     let told = remarks(&file).join("; ");
     for expected in [
         "#0: 1 of 2 heights that are none",
-        "#1: a vertex at -117, NaN, which is not on the Earth (left out)",
-        "#2: a vertex at -116.991, NaN",
+        "#1: a coordinate null, expected a number (left out)",
+        "#2: a coordinate null, expected a number (left out)",
+        "#6: a coordinate \"a\", expected a number (left out)",
         "#3: a geometry that is none (left out)",
         "#4: a geometry that is none (left out)",
         "#5: a place that is none (left out)",

@@ -73,7 +73,10 @@ fn a_look_at_the_chunks_tells_what_the_whole_raster_would() {
         if row == 7 && col < 5 { -1 } else { (row * 40 + col) as i16 }
     });
     let window = PostRect::new(Post::new(5, 2), Post::new(20, 30));
-    let (look, whole) = (file.look(window, &file.chunks_of(window)).unwrap(), file.read(window).unwrap());
+    let reach = file.reach(&utm(), &grid(500_050.0, 4_000_080.0, 10.0), PostRect::of_size(9, 12));
+    let look = file.look(window, Some(&reach), &file.chunks_of(window)).unwrap();
+    let whole = file.read(window).unwrap();
+    assert!(look.reached_m.is_some() && look.reached_m == whole.range_within_m(&reach));
     assert_eq!((look.posts, look.voids, look.range_m), (window.post_count(), 3, whole.range_m()));
     assert_eq!(look.first_void.as_deref(), Some("500020.0, 4000070.0 m"));
 }

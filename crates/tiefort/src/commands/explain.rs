@@ -297,13 +297,13 @@ fn one_more_text(found: &Explanation) -> String {
     match (&found.one_more, &found.no_ground) {
         (Some(more), _) => {
             let [east, north] = more.place_m;
-            let [rms_m, ..] = found.residual_m;
             let (larger, of) = (grouped(more.place as u64 - 1), grouped(found.place.1 as u64));
             let before = share_before(found, more.place).unwrap_or_else(|| format!("{larger} of {of} load modules"));
             format!(
-                "One more point, two triangles, would take the RMS residual from {rms_m:.3} m to {:.3} m:\n  at {east} \
+                "One more point, two triangles, would take the RMS residual from {:.3} m to {:.3} m:\n  at {east} \
                  {north}, {:.2} m {} the triangle there; half of that a triangle.\n  \
                  {}{} would gain more.\n",
+                more.rms_before_m,
                 more.rms_after_m,
                 more.raised_m.abs(),
                 if more.raised_m < 0.0 { "below" } else { "above" },
@@ -397,6 +397,7 @@ pub fn to_json(found: &Explanation) -> Value {
             "place_m": more.place_m,
             "raised_m": more.raised_m,
             "triangles": 2,
+            "rms_before_m": more.rms_before_m,
             "rms_after_m": more.rms_after_m,
             "place": more.place,
         })),

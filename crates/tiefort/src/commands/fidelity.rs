@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use inspect::{DatabaseFidelity, PastObjectsFound, Sights};
 use serde_json::{Value, json};
-use views::grouped;
+use views::{fold, grouped};
 
 use crate::arguments::Format;
+use crate::commands::OUTDATED;
 use crate::failure::{Failure, Outcome};
 use crate::{measures, measures_json};
 
@@ -66,7 +67,9 @@ const BURNED: &str =
     "\nas tiles were refined to it, with roads and water burned in; --against FILE measures against FILE itself";
 
 fn text(found: &DatabaseFidelity) -> String {
-    let note = found.no_classes.as_ref().map(|why| format!("\nnote: residuals are not told by class: {why}\n"));
+    let classes = found.no_classes.as_ref().map(|why| format!("residuals are not told by class: {why}"));
+    let outdated = found.is_outdated.then(|| format!("the database is outdated: {OUTDATED}"));
+    let notes: String = outdated.into_iter().chain(classes).map(|note| fold(&format!("\nnote: {note}\n"), 2)).collect();
     let figures = measures::text(&found.measures);
     let burned = if found.is_burned { BURNED } else { "" };
     let own = found.at_own_posts.as_ref().map(|own| {
@@ -74,9 +77,9 @@ fn text(found: &DatabaseFidelity) -> String {
         format!("At the raster's own posts: RMS {rms_m:.3} m, largest {max_m:.2} m, {posts} posts\n")
     });
     let (area, against) = (&found.area, &found.against);
-    let (own, note) = (own.unwrap_or_default(), note.unwrap_or_default());
+    let own = own.unwrap_or_default();
     let past = found.past_objects.map(|past| past_text(&past)).unwrap_or_default();
-    format!("Gaming area {area} against {against}{burned}\n{own}\n{figures}{past}{note}")
+    format!("Gaming area {area} against {against}{burned}\n{own}\n{figures}{past}{notes}")
 }
 
 fn past_text(past: &PastObjectsFound) -> String {
@@ -93,6 +96,7 @@ fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
         "area": found.area,
         "against": found.against,
         "has_features_burned_in": found.is_burned,
+        "outdated": found.is_outdated,
         "residual_at_own_posts": found.at_own_posts.as_ref().map(measures_json::residual),
         "seed": sights.seed,
         "past_objects": found.past_objects,

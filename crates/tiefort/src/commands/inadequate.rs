@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, fold, grouped};
 
 use crate::arguments::{Format, one_of, positive};
+use crate::commands::OUTDATED;
 use crate::failure::{Failure, Outcome};
 use crate::{files, terminal};
 
@@ -103,14 +104,18 @@ fn maps(found: &Inadequate) -> [Image; 2] {
 fn text(found: &Inadequate, files: &[PathBuf; 3]) -> String {
     let all = &found.components;
     let posts: u64 = all.iter().map(|component| component.posts).sum();
+    let ground = if found.is_outdated { "as it is now" } else { "that tiles were refined to" };
     let mut text = format!(
-        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\nagainst the ground that tiles were refined to, \
+        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\nagainst the ground {ground}, \
          any roads and water in it; `tiefort fidelity --against FILE` measures against a raster\n",
         found.area,
         grouped(all.len() as u64),
         grouped(posts),
         found.tolerance_m
     );
+    if found.is_outdated {
+        text += &format!("The database is outdated: {OUTDATED}. Until then, no limit need stand in the way.\n");
+    }
     if !all.is_empty() {
         let mut table = Table::new(&[Align::Right, Align::Right, Align::Right, Align::Right, Align::Left]);
         table.row(["posts", "worst m", "east", "north", "stands in the way"]);
@@ -158,6 +163,7 @@ fn geojson(found: &Inadequate) -> Value {
         "name": "inadequate",
         "crs": { "type": "name", "properties": { "name": name } },
         "tolerance_m": found.tolerance_m,
+        "outdated": found.is_outdated,
         "features": features,
     })
 }

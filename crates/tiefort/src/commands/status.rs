@@ -9,6 +9,7 @@ use store::engine::Held;
 use views::{fold, grouped};
 
 use crate::board::Board;
+use crate::commands::OUTDATED;
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -16,8 +17,11 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort status ntc.tdb
 
-Exit codes: 0 complete, all limits met; 1 complete, with breaches; 2 incomplete;
-75 being built right now.";
+Files are not read: it looks whether each is there with its length, and whether
+the report is of this build. `tiefort verify` reads them all.
+
+Exit codes: 0 complete, all limits met; 1 complete, with breaches; 2 incomplete
+or damaged; 75 being built right now.";
 
 /// Arguments of `status`.
 #[derive(Args)]
@@ -30,6 +34,8 @@ pub struct Arguments {
 
 /// Tiles side by side that fit a terminal, two columns each.
 const BOARD_COLUMNS_MAX: u32 = 38;
+/// Damaged files that are told.
+const DAMAGE_MAX: usize = 10;
 /// Characters by how much they matter where one stands for several tiles.
 const ORDER: [char; 5] = ['.', '!', 'f', 'o', '#'];
 
@@ -46,8 +52,7 @@ const STATES: [(TileProgress, char, &str); 5] = [
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let status = inspect::status(&arguments.database)?;
     terminal::print(&status_text(&status))?;
-    let missing = status.tiles.iter().any(|(_, progress)| *progress == TileProgress::Missing);
-    let complete = status.is_complete() && !missing;
+    let complete = status.is_complete() && status.damage.is_empty();
     Ok(match (status.held, complete, status.manifest.totals.breaches) {
         (Held::Alone, ..) | (Held::Shared, false, _) => Outcome::TryLater,
         (_, false, _) => Outcome::Damaged,
@@ -59,15 +64,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 fn status_text(status: &Status) -> String {
     let Manifest { area, totals, .. } = &status.manifest;
     let tiles = &status.tiles;
-    let missing = tiles.iter().any(|(_, progress)| *progress == TileProgress::Missing);
     let state = match (status.held, status.is_complete()) {
         (Held::Alone, _) => "being built right now",
         (Held::Shared, false) => "being built right now by processes that share it",
         (Held::Free, false) => "incomplete: `tiefort build` goes on with it",
-        (_, true) if missing => "damaged: files are missing; `tiefort build` makes them again",
+        (_, true) if !status.damage.is_empty() => "damaged: `tiefort build` makes these files again",
         (_, true) => "complete",
     };
-    let mut text = format!("Gaming area {}: {state}\n\n", area.name);
+    let mut text = format!("Gaming area {}: {state}\n", area.name);
+    status.damage.iter().take(DAMAGE_MAX).for_each(|problem| text += &format!("  {problem}\n"));
+    let more = status.damage.len().saturating_sub(DAMAGE_MAX);
+    if 0 < more {
+        text += &format!("  and {} more: `tiefort verify` tells all\n", grouped(more as u64));
+    }
+    if status.is_outdated {
+        text += &format!("outdated: {OUTDATED}\n");
+    }
+    text += "\n";
     let mut board = Board::new(area.tile_rows, area.tile_cols);
     for &(tile, progress) in tiles {
         board.mark(tile, mark(progress));

@@ -21,12 +21,13 @@ Examples:
 The order is: survey of every tile, allocate, refine of every tile after its
 lower-ranked neighbours, assemble of every tile (with clipped edges after its
 neighbours' refine), publish. A unit may be run any number of times, anywhere
-that shares the folder; one that finds its result published and fresh ends with
-0 at once. Where the job surveys nothing, survey does nothing. publish makes
-whatever is missing or damaged, so it always ends with the result of a build.
+that shares the folder; one that finds its result published and fresh ends at
+once. Where the job surveys nothing, survey does nothing. publish makes whatever
+is missing or damaged, so it always ends with the result of a build, also where
+that is published already.
 
-Exit codes: 0 done; 1 published, with breaches; 2 failed; 75 what it needs is
-not done yet: try again.";
+Exit codes: 0 done; 1 published, with breaches; 2 failed, or, with --strict,
+published with breaches or warnings; 75 what it needs is not done yet: try again.";
 
 /// Arguments of `task`.
 #[derive(Args)]
@@ -54,7 +55,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let end = run.listen(|listener| build::perform(&job, run.folder(), &units, &run.options(false), listener))?;
     match end {
         UnitEnd::Published(built) => Ok(run.conclude(&Finished::from(*built))),
-        UnitEnd::Done | UnitEnd::Finished => Ok(Outcome::Sound),
+        UnitEnd::Finished(built) if arguments.stage == Stage::Publish => Ok(run.conclude(&Finished::from(*built))),
+        UnitEnd::Done | UnitEnd::Finished(_) => Ok(Outcome::Sound),
     }
 }
 

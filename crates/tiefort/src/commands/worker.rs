@@ -21,8 +21,10 @@ Each takes tiles that are ready and that no other is working on, until the
 build is done; one of them publishes it. Any of them may be killed: what it was
 working on is done by another once its lease is over. Clocks need not agree.
 
-Exit codes: 0 done; 1 published, with breaches; 2 failed; 75 a build or another
-job is at work in the folder.";
+Every worker ends as the build does, whichever published it.
+
+Exit codes: 0 done; 1 done, with breaches; 2 failed, or, with --strict, done with
+breaches or warnings; 75 a build or another job is at work in the folder.";
 
 /// What a worker waits for when nothing is ready.
 const PAUSE: Duration = Duration::from_millis(200);
@@ -58,19 +60,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             }
         }
     })?;
-    let WorkerEnd { units, published } = end;
-    match published {
-        Some(built) => {
-            let tiles = format!("done by workers; this one did {units} units of work and published");
-            Ok(run.conclude(&Finished { tiles, ..Finished::from(*built) }))
+    let WorkerEnd { units, built } = end;
+    if built.is_unchanged {
+        if !arguments.run.quiet {
+            let (breaches, warnings) = (built.report.breaches.len(), built.report.warnings.len());
+            let found = format!("{breaches} breaches, {warnings} warnings");
+            terminal::tell(&format!("the build is done: {found}; this worker did {units} units of work"));
         }
-        None => {
-            if !arguments.run.quiet {
-                terminal::tell(&format!("the build is done; this worker did {units} units of work"));
-            }
-            Ok(Outcome::Sound)
-        }
+        return Ok(run.judge(&built.report));
     }
+    let tiles = format!("done by workers; this one did {units} units of work and published");
+    Ok(run.conclude(&Finished { tiles, ..Finished::from(*built) }))
 }
 
 /// A name that no other worker has: the host's, the process's number, and when it began.

@@ -162,6 +162,45 @@ fn a_pinned_down_residual_that_limits_forbid_is_a_breach() {
     scene.run_to(0, &["verify", "small.tdb"]);
     let breaches: Value = serde_json::from_slice(&fs::read(scene.path("small.tdb/breaches.geojson")).unwrap()).unwrap();
     assert_eq!(breaches["features"][0]["properties"]["kind"], "residual");
+    // Those that find it finished end as the build does; a unit of it is done.
+    for command in [&["worker", "job.toml"][..], &["task", "job.toml", "publish"]] {
+        scene.run_to(1, &[command, &["--quiet"]].concat());
+        scene.run_to(2, &[command, &["--quiet", "--strict"]].concat());
+    }
+    scene.run_to(0, &["task", "job.toml", "refine", "0,0", "--quiet"]);
+}
+
+#[test]
+fn status_tells_of_damage_that_shows_without_reading_files() {
+    let scene = Scene::with_job("small.toml", &[]);
+    scene.run_to(0, &["build", "job.toml", "--quiet"]);
+    let path = |name: &str| scene.path("small.tdb").join(name);
+    let manifest = fs::read_to_string(path("database.json")).unwrap();
+    let cut = |name: &str| fs::write(path(name), b"short").unwrap();
+    let damage: [(&str, &dyn Fn(), &str); 4] = [
+        ("modules/r00c00.slm", &|| cut("modules/r00c00.slm"), "found 5 bytes"),
+        ("modules/r01c01.slm", &|| fs::remove_file(path("modules/r01c01.slm")).unwrap(), "no such file"),
+        ("report.json", &|| fs::remove_file(path("report.json")).unwrap(), "no such file"),
+        (
+            "report.json",
+            &|| fs::copy(path("../other.tdb/database.json"), path("database.json")).map(drop).unwrap(),
+            "not of",
+        ),
+    ];
+    let other = fs::read_to_string(scene.path("job.toml"))
+        .unwrap()
+        .replace("name = \"small\"", "name = \"small\"\ntitle = \"x\"");
+    fs::write(scene.path("other.toml"), other).unwrap();
+    scene.run_to(0, &["build", "other.toml", "--out", "other.tdb", "--quiet"]);
+    for (file, spoil, told) in damage {
+        spoil();
+        let said = scene.run_to(2, &["status", "small.tdb"]).stdout;
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(said.contains("damaged: `tiefort build`") && said.contains(file) && said.contains(told), "{said}");
+        scene.run_to(0, &["build", "job.toml", "--quiet"]);
+        let said = scene.run_to(0, &["status", "small.tdb"]).stdout;
+        assert!(said.contains("complete") && fs::read_to_string(path("database.json")).unwrap() == manifest, "{said}");
+    }
 }
 
 #[test]

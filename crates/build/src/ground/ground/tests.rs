@@ -70,6 +70,28 @@ fn a_raster_read_by_window_is_the_same_ground_as_one_read_whole() {
     assert_eq!(by_window.warnings, whole.warnings);
 }
 
+#[test]
+fn heights_beside_the_area_are_none_of_the_sources_under_it() {
+    let folder = TempDir::new().unwrap();
+    let spacing = Spacing::from_metres(25.0).unwrap();
+    let frame = GridFrame { origin_east_m: 504_500.0, origin_north_m: 3_874_500.0, spacing };
+    // The area's first post is (20, 20), its last (140, 140); cubic resampling reaches two posts beyond.
+    let metres = |post: Post| match [post.row, post.col] {
+        [17, 50] => 900,
+        [140, 80] => 700,
+        _ => 500,
+    };
+    let heights = |band| Dem::from_fn(band, |post| Some(128 * metres(post)));
+    let mut file = std::fs::File::create(folder.path().join("dem.tif")).unwrap();
+    write_heights(&mut file, &frame, PostRect::of_size(161, 161), 32611, heights).unwrap();
+    let job = job(folder.path(), "sources = [\"dem.tif\"]\nresampling = \"cubic\"", "");
+    for whole_bytes_max in [u64::MAX, 0] {
+        let ground = open(&job, whole_bytes_max).unwrap().1;
+        let highest_m = |bounds: Option<Bounds>| bounds.unwrap().metres().1.floor();
+        assert_eq!([ground.relief.bounds, ground.bounds()].map(highest_m), [900.0, 700.0]);
+    }
+}
+
 /// A square lake of 800 m over the middle of the area, where four tiles meet.
 fn write_lake(folder: &Path) {
     let [west, south] = [506_100.0, 3_876_100.0];
