@@ -240,10 +240,7 @@ impl AreaFeatures {
         let resting = ground_of(&self.roads, &|place| middle(place).and(at(place)), &near);
         let mut hills = under_hills(&self.roads, &resting, options.cut_max);
         let roads = &*self.roads.with_tunnels(&hills);
-        let afloat = afloat(&self.outlines, &self.known(&lakes, inside), roads, &self.road_sides, &self.site);
-        let pins = with_water(roads, pins(roads, &self.ways), &afloat, &mut remarks);
-        // One that cannot be kept is none to tell: no border has to be met.
-        let pins = with_water(roads, pins, &self.met(roads, &natural, middle_of), &mut Vec::new());
+        let (afloat, pins) = self.pinned(roads, &self.known(&lakes, inside), &natural, &mut remarks);
         let amid = middles_of(roads, &middle, &resting);
         let mut water = water(&strands);
         water.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
@@ -328,6 +325,15 @@ impl AreaFeatures {
         strands.extend(waters.outlines_only.iter().flat_map(only));
         let level = rivers.nodes.iter().zip(&fallen.is_level).filter(|(_, is_level)| **is_level);
         Watered { strands, lakes: waters.lakes, level: level.map(|(node, _)| node.place).collect() }
+    }
+
+    /// The nodes of roads that lie in lakes with the levels of these, and all nodes that have to keep a height.
+    fn pinned(&self, roads: &Network, lakes: &[Lake], at: Ground, remarks: &mut Vec<Remark>) -> (Vec<Pin>, Vec<Pin>) {
+        let afloat = afloat(&self.outlines, lakes, roads, &self.road_sides, &self.site);
+        let pins = with_water(roads, pins(roads, &self.ways), &afloat, remarks);
+        // One that cannot be kept is none to tell: no border has to be met.
+        let pins = with_water(roads, pins, &self.met(roads, at, middle_of), &mut Vec::new());
+        (afloat, pins)
     }
 
     /// The heights at which ways on the ground cross a border that others meet: of those of the ground along it.

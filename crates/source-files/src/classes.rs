@@ -6,7 +6,7 @@ use terrain::geometry::resample::{TAP_UNITS, nearest};
 use terrain::{GridFrame, Post, PostRect};
 
 use crate::crs::Crs;
-use crate::resample::{col_of, row_of};
+use crate::frame::{col_of, row_of};
 use crate::warp::Warp;
 use crate::{DemFile, Raster, RasterFrame, Reading, SourceError, Windows};
 

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use terrain::PostRect;
+use terrain::{GridFrame, PostRect};
 
 use crate::SourceError;
 use crate::crs::vertical::{FOOT_M, US_FOOT_M, unit_m};
@@ -323,6 +323,16 @@ fn transformed(path: &Path, matrix: &[f64]) -> Result<[[f64; 2]; 2], SourceError
 
 fn malformed(path: &Path, what: &str, found: String, expected: &str) -> SourceError {
     SourceError::Malformed { path: path.into(), what: what.into(), found, expected: expected.into() }
+}
+
+/// Where a column of the grid lies, in columns of the raster.
+pub(crate) fn col_of(frame: &RasterFrame, grid: &GridFrame, col: i32) -> f64 {
+    (grid.east_m(col) - frame.south_west[0]) / frame.spacing[0]
+}
+
+/// Where a row of the grid lies, in rows of the raster.
+pub(crate) fn row_of(frame: &RasterFrame, grid: &GridFrame, row: i32) -> f64 {
+    (grid.north_m(row) - frame.south_west[1]) / frame.spacing[1]
 }
 
 #[cfg(test)]

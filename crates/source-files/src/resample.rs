@@ -3,6 +3,7 @@
 use terrain::geometry::resample::{HeightScale, Tap, Taps, blend_rows, sample_row, tap};
 use terrain::{Dem, GridFrame, Post, PostRect, QUANTA_PER_METRE, Side};
 
+use crate::frame::{col_of, row_of};
 use crate::{Raster, RasterFrame, SourceError};
 
 /// The posts of a raster that the posts `rect` of the working grid are made of.
@@ -25,16 +26,6 @@ fn taps(frame: &RasterFrame, grid: &GridFrame, rect: PostRect) -> Result<(Vec<Ta
         (Some(cols), Some(rows)) => Ok((cols, rows)),
         _ => Err(SourceError::NotCovered { path: frame.path.clone(), missing: missing(frame, grid, rect) }),
     }
-}
-
-/// Where a column of the grid lies, in columns of the raster.
-pub(crate) fn col_of(frame: &RasterFrame, grid: &GridFrame, col: i32) -> f64 {
-    (grid.east_m(col) - frame.south_west[0]) / frame.spacing[0]
-}
-
-/// Where a row of the grid lies, in rows of the raster.
-pub(crate) fn row_of(frame: &RasterFrame, grid: &GridFrame, row: i32) -> f64 {
-    (grid.north_m(row) - frame.south_west[1]) / frame.spacing[1]
 }
 
 /// The sides on which the raster ends before the area does, and by how many metres.

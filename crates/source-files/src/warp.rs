@@ -13,7 +13,7 @@ use terrain::{GridFrame, PostRect};
 
 use crate::RasterFrame;
 use crate::crs::Crs;
-use crate::resample::{col_of, row_of};
+use crate::frame::{col_of, row_of};
 
 /// Grid posts between projected places, and the most metres between them.
 const STEP_POSTS: i32 = 16;

@@ -71,8 +71,8 @@ impl Folder {
         Ok(damage)
     }
 
-    /// What shows of damage without reading more than the report: files that `manifest` or the report lists and that are
-    /// not there or have another length, and a report that is missing or of another build.
+    /// What shows of damage without reading more than the report: files that `manifest` or the report lists and that
+    /// are not there or have another length, and a report that is missing or of another build.
     pub fn visible_damage(&self, manifest: &Manifest) -> Vec<Damage> {
         let listed = self.listed_files(manifest).into_iter();
         let damage = listed.filter_map(|(path, stamp)| {

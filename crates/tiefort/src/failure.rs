@@ -13,6 +13,10 @@ use store::DatabaseError;
 
 use crate::terminal::{self, NotPrinted};
 
+/// What it means that a database is outdated.
+pub const OUTDATED: &str =
+    "some tiles were made again from changed sources, and others were not; `tiefort build` makes these, too";
+
 /// How a command ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {

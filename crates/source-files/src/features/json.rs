@@ -51,7 +51,11 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     let is_assumed = said.is_none() && raw.iter().any(|feature| feature.shape.vertices().next().is_some());
     let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
     if is_assumed {
-        placing.note_assumed_system();
+        placing.note(format!(
+            "it names no coordinate system and its numbers are no degrees: they are taken for metres of EPSG:{}; \
+             crs names another",
+            wanted.epsg
+        ));
     }
     for (id, found) in faults {
         placing.count_left_out();

@@ -160,15 +160,6 @@ impl Placing {
         self.unsound.0 += 1;
     }
 
-    /// Tells that the file is taken to be in the area's system, as nothing says otherwise.
-    pub(super) fn note_assumed_system(&mut self) {
-        let area = self.area.name();
-        self.note(format!(
-            "it names no coordinate system and its numbers are no degrees: they are taken for metres of {area}; crs \
-             names another"
-        ));
-    }
-
     /// Where a vertex of the file lies, for remarks.
     pub(super) fn at(&self, vertex: &Vertex) -> Option<[f64; 2]> {
         let place = [vertex[0], vertex[1]];

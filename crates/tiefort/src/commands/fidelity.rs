@@ -8,8 +8,7 @@ use serde_json::{Value, json};
 use views::{fold, grouped};
 
 use crate::arguments::Format;
-use crate::commands::OUTDATED;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, OUTDATED, Outcome};
 use crate::{measures, measures_json};
 
 const AFTER_HELP: &str = "\

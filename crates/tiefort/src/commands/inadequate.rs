@@ -9,8 +9,7 @@ use serde_json::{Value, json};
 use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, fold, grouped};
 
 use crate::arguments::{Format, one_of, positive};
-use crate::commands::OUTDATED;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, OUTDATED, Outcome};
 use crate::{files, terminal};
 
 const AFTER_HELP: &str = "\

@@ -41,10 +41,6 @@ use clap::Subcommand;
 
 use crate::failure::{Failure, Outcome};
 
-/// What it means that a database is outdated.
-const OUTDATED: &str =
-    "some tiles were made again from changed sources, and others were not; `tiefort build` makes these, too";
-
 /// What to do.
 #[derive(Subcommand)]
 pub enum Command {

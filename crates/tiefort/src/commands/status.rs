@@ -9,8 +9,7 @@ use store::engine::Held;
 use views::{fold, grouped};
 
 use crate::board::Board;
-use crate::commands::OUTDATED;
-use crate::failure::{Failure, Outcome};
+use crate::failure::{Failure, OUTDATED, Outcome};
 use crate::terminal;
 
 const AFTER_HELP: &str = "\
