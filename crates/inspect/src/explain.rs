@@ -101,9 +101,9 @@ pub struct OneMore {
     pub place_m: [f64; 2],
     /// How far it would stand above the triangle that is there, in metres.
     pub raised_m: f64,
-    /// RMS residual of the load module on that ground now and then, in metres.
+    /// RMS residual of the load module on that ground, in metres.
     pub rms_before_m: f64,
-    /// See there.
+    /// The same with that point.
     pub rms_after_m: f64,
     /// Place of this gain among those of the load modules that it is compared with, the largest being 1.
     pub place: usize,
