@@ -229,10 +229,9 @@ impl Ground {
 
     /// What `database.json` says of the spacing, what `report.json` says, and the names of classes.
     fn told(&self, py: Python<'_>) -> PyResult<(f64, String)> {
-        self.held(py)?;
-        let folder = Folder::new(&self.path);
-        let read = py.detach(|| Ok((folder.finished()?.area.spacing_m, library::report_json(&folder.report()?))));
-        read.map_err(|failure: Failure| raised(py, &failure))
+        let spacing_m = self.held(py)?.opened.contents.manifest.area.spacing_m;
+        let read = py.detach(|| Ok(library::report_json(&Folder::new(&self.path).report()?)));
+        read.map(|report| (spacing_m, report)).map_err(|failure: Failure| raised(py, &failure))
     }
 
     /// Heights at places, each an easting and a northing; not a number where there is no ground.
