@@ -11,8 +11,8 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use store::Folder;
-use tiefort::contents::Opened;
-use tiefort::library::{self, Cause, Failure};
+use tiefort::contents::{Opened, damaged};
+use tiefort::library::{self, Failure};
 
 use crate::arrays::{places, table};
 use crate::raised::{named, raised};
@@ -44,11 +44,6 @@ struct Held {
 type ModuleArrays<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyDict>);
 
-fn unreadable(error: &ReadError) -> Failure {
-    let hint = "`tiefort verify` says what is damaged; a build mends it";
-    Failure::about(Cause::Database, error, hint)
-}
-
 impl Ground {
     /// What is held, which the caller may change a copy of.
     fn held(&self, py: Python<'_>) -> PyResult<Held> {
@@ -72,7 +67,7 @@ impl Ground {
             Some(ground) => ground.moved(area, wanted),
             None => area.load(wanted),
         };
-        let ground = Arc::new(ground.map_err(|error| unreadable(&error))?);
+        let ground = Arc::new(ground.map_err(|error| damaged(&error))?);
         held.ground = Some(Arc::clone(&ground));
         let mut kept = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         if kept.is_some() {
@@ -377,7 +372,7 @@ impl Ground {
     /// What stands on the ground: pieces of prisms, and of canopies.
     fn objects(&self, py: Python<'_>) -> PyResult<(Vec<PrismRow>, Vec<CanopyRow>)> {
         let opened = self.held(py)?.opened;
-        wait(py, None, move |_, _| objects_of(whole(&opened)?).map_err(|error| unreadable(&error)))
+        wait(py, None, move |_, _| objects_of(whole(&opened)?).map_err(|error| damaged(&error)))
     }
 
     /// One load module at a level of detail.
@@ -417,7 +412,7 @@ impl Ground {
     /// A row for each load module: row, column, triangles, vertices, posts measured, RMS and largest residual.
     fn modules<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let opened = self.held(py)?.opened;
-        let rows = wait(py, None, move |_, _| rows_of(whole(&opened)?).map_err(|error| unreadable(&error)))?;
+        let rows = wait(py, None, move |_, _| rows_of(whole(&opened)?).map_err(|error| damaged(&error)))?;
         table(py, rows.into_iter())
     }
 }

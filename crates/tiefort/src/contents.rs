@@ -154,7 +154,8 @@ impl Opened {
     }
 }
 
-fn damaged(error: &dyn std::fmt::Display) -> Failure {
+/// Why a database cannot be read, and what to do.
+pub fn damaged(error: &dyn std::fmt::Display) -> Failure {
     let hint = "`tiefort verify` says what is damaged, `tiefort build` mends it";
     Failure::about(Cause::Database, error, hint)
 }

@@ -14,7 +14,7 @@ use views::{RESIDUAL_SCALE_M, palette};
 use super::buildings::Buildings;
 use super::lines::Lines;
 use super::overview::Overview;
-use crate::contents::Opened;
+use crate::contents::{Opened, damaged};
 use crate::failure::Failure;
 
 /// The version of the format from which on load modules have lines.
@@ -54,11 +54,10 @@ impl Viewed {
     pub fn open(folder: &Path) -> Result<Self, Failure> {
         let first = ModuleRect { south: 0, west: 0, north: 1, east: 1 };
         let product = Product::read(folder, &Wanted { part: Some(first), ground: WantedGround::None, workers: 1 })?;
-        let damaged = |error| Failure::new(error, "`tiefort verify` says what is damaged, `tiefort build` mends it");
         let Opened { contents, area } = Opened::open(folder)?;
         contents.files_of(area.whole())?;
         let waters = waters(&product.job);
-        let mut overview = Overview::read(&area, &waters).map_err(damaged)?;
+        let mut overview = Overview::read(&area, &waters).map_err(|error| damaged(&error))?;
         let level = product.features.as_ref().map(|(level, _)| level);
         let in_modules = level.is_some() && VERSION_WITH_LINES <= product.job.modules.format;
         let lines = (!in_modules).then(|| level.map(|level| Lines::of(level, area.frame())).unwrap_or_default());
