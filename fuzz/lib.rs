@@ -37,7 +37,7 @@ pub fn use_up(path: &Path) {
     if POSTS_MAX < rect.post_count() {
         return;
     }
-    let _ = file.look(rect, &file.chunks_of(rect));
+    let _ = file.look(rect, None, &file.chunks_of(rect));
     let windows = Windows::new(vec![file.clone()], 1 << 16);
     let middle = PostRect { south: rect.north / 3, west: rect.east / 3, north: rect.north / 2, east: rect.east / 2 };
     let part = windows.read(0, middle);
