@@ -47,7 +47,7 @@ SHORT_SEEDS, SHORT_SECONDS = 80, 75
 REFUSALS = [
     r"need more triangles than mean_per_load_module",
     r"a forbidden post, .*, that is a corner",
-    r"fowler-little: .* points, on\s+lines simplified to that tolerance",
+    r"fowler-little: .* points, on lines simplified to that tolerance",
 ]
 
 
@@ -69,7 +69,8 @@ class Attack:
                                timeout=BUILD_SECONDS_MAX)
         if ended.returncode not in (0, 1, 2) or "panicked" in ended.stderr:
             self.fault("panic", f"{' '.join(arguments)} ended with {ended.returncode}: {ended.stderr[-600:]}")
-        return ended.returncode, (ended.stdout + ended.stderr).strip()
+        # The program breaks its lines to a width, anywhere.
+        return ended.returncode, " ".join((ended.stdout + ended.stderr).split())
 
     def build(self, job, into, kind="build"):
         """Builds a job; whether there is a database now, and the exit code."""
@@ -177,7 +178,7 @@ class Attack:
     def agree(self, what, faults, *arguments):
         code, said = self.run(*arguments)
         # What limits left under the ground is told, and no damage.
-        if re.search(r"[1-9]\d* of them\s+under\s+the\s+ground", said):
+        if re.search(r"[1-9]\d* of them under the ground", said):
             faults = faults - {"deck"}
         if code == 0 and faults:
             self.fault("blind", f"{what} says sound, and the judge found {', '.join(sorted(faults))}")
