@@ -34,7 +34,7 @@ def growth():
     parser.add_argument("--instructions", action="store_true", help="count instructions with valgrind's callgrind")
     parser.add_argument("--short", action="store_true", help="one decade of each, and no more than four times the cost")
     options = parser.parse_args()
-    most, runs = (4.0, 3) if options.short else (1.3, 1)
+    most, runs, noise = (4.0, 3, 0.2) if options.short else (1.3, 1, 0.05)
     tiefort, rows, grows = program(options), [], False
     for name in [options.only] if options.only else SERIES:
         title, sizes, job_of, is_more = SERIES[name]
@@ -49,8 +49,8 @@ def growth():
             tell(f"{name}: {size:,}")
             whole, report = least(size)
             count = report["triangles"] if name == "triangles" else size * (1000 if name == "features" else 1)
-            # A twentieth of the build without is its noise: what costs less is no measure for the next decade.
-            each = max(whole - none, 0.05 * none) / count
+            # A part of the build without is its noise: what costs less is no measure for the next decade.
+            each = max(whole - none, noise * none) / count
             # Where sizes are no decade apart, as if they were.
             ratio = None if before is None else (each / before[1]) ** (1 / math.log10(count / before[0]))
             grows |= ratio is not None and most < ratio

@@ -23,6 +23,14 @@ pub(super) fn read(area: &Section, modules: &Section, find: &mut Find) -> Result
     let (spacing_entry, spacing) = spacing(area)?;
     let border_step_m = length(modules, "border_step_m")?;
     let side_m = length(modules, "side_m")?;
+    if let Some(step) = modules.optional("border_step_m")
+        && spacing.posts_in(Metres(side_m)).is_some()
+        && spacing.posts_in(Metres(border_step_m)).is_none()
+    {
+        // The spacing fits the load module, so it is the step that does not.
+        let expected = format!("a multiple of area.spacing_m, {} m", spacing.metres());
+        return Err(step.out_of_range_with(expected, "the usual one is border_step_m = 125"));
+    }
     let border_step_cells = border_step_cells(&spacing_entry, spacing, border_step_m, side_m)?;
     let side_cells = side_cells(modules, spacing, side_m, border_step_m)?;
     let (epsg, origin_m, grid) = match (place, epsg) {

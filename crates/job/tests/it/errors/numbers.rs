@@ -360,6 +360,14 @@ fn lengths_that_do_not_divide_are_refused_with_one_that_does() {
     );
     check(
         "side_m",
+        "border_step_m = 90",
+        &[
+            "a/b.toml:14: load_modules.border_step_m: found 90, expected a multiple of area.spacing_m, 25 m",
+            "hint: the usual one is border_step_m = 125",
+        ],
+    );
+    check(
+        "side_m",
         "border_step_m = 150",
         &[
             "a/b.toml:14: load_modules.border_step_m: found 150, expected a side of a load module that is a",
