@@ -316,7 +316,7 @@ impl AreaFeatures {
         let mut strands = channels(rivers, &fallen);
         strands.extend(waters.lakes.iter().flat_map(|lake| shore(&outlines[lake.outline as usize], lake.level)));
         let inside = lines_inside(outlines, &waters.banks, rivers, &fallen, site);
-        let of_bank = |(number, line): (&u32, &crate::parts::Line)| banks(&outlines[*number as usize], line);
+        let of_bank = |(number, line): (&u32, &crate::parts::Line)| banks(&outlines[*number as usize], line, site);
         strands.extend(waters.banks.iter().zip(&inside).flat_map(of_bank));
         let only = |number: &u32| {
             let outline = &outlines[*number as usize];

@@ -123,7 +123,7 @@ pub(crate) fn form(graded: &Graded, strands: &[Strand], site: &Site, each: Each,
     }
     let Forming { sharing, thinned, .. } = forming;
     let points = within(&formed, site);
-    let decided = (&points[..], &formed.faces[..]);
+    let decided = (&points[..], &formed.faces[..], &mut formed.decks[..]);
     formed.middles = middles(graded, (&pieces, &sharing.wide), (strands, &thinned), decided, site);
     remark_rooms(network, &pieces, &sharing.wide, &mut remarks);
     formed.remarks.append(&mut remarks);

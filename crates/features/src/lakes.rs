@@ -1,11 +1,12 @@
 //! Lakes lie level: each water body at one height, its shore with it.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use crate::clean::Notes;
 use crate::rings::encloses;
 use crate::strand::{Role, Strand};
-use crate::{FallOptions, FeatureLattice, Flaw, Kind, Outline, Place, Remark, Remedy, Ring};
+use crate::thin::{Station, Tolerance, thin};
+use crate::{FallOptions, FeatureLattice, Flaw, Kind, Outline, Place, Remark, Remedy, Ring, Site};
 
 /// A level that its source gives may lie this far, in quanta, from the heights of the shore: 10 m.
 const LEVEL_OFF_MAX: i32 = 10 * 128;
@@ -287,9 +288,50 @@ pub fn shore(outline: &Outline, level: i32) -> Vec<Strand> {
 
 /// A polygon of a river level across: each place of its bank has the height of the nearest place of the lines inside.
 ///
-/// `line` are edges of the river inside the outline, with the heights of their ends.
-pub fn banks(outline: &Outline, line: &[([Place; 2], [i32; 2])]) -> Vec<Strand> {
-    strands(outline, Role::Bank, &|place, _| nearest_height(line, place).unwrap_or(0))
+/// `line` are edges of the river inside the outline, with the heights of their ends. Where lines between load modules
+/// run inside from bank to bank, they are banks, too, as far as the water does not fall evenly along them: they are
+/// edges of the TIN.
+pub fn banks(outline: &Outline, line: &[([Place; 2], [i32; 2])], site: &Site) -> Vec<Strand> {
+    let height = |place: Place| nearest_height(line, place).unwrap_or(0);
+    let mut strands = strands(outline, Role::Bank, &|place, _| height(place));
+    for chord in chords(outline, site) {
+        let station = |place| Station { place, height: height(place), stays: false, flat: [0; 2] };
+        let stations: Vec<Station> = chord.into_iter().map(station).collect();
+        let kept = thin(&stations, Tolerance::USUAL, 0, site.lattice);
+        if 2 < kept.len() {
+            let stations = kept.into_iter().map(|at| &stations[at as usize]).map(|it| (it.place, it.height)).collect();
+            strands.push(Strand { role: Role::Bank, class: outline.traits.class, id: outline.id, stations });
+        }
+    }
+    strands
+}
+
+/// What of tile and load-module lines lies inside an outline: places a post apart, from bank to bank.
+fn chords(outline: &Outline, site: &Site) -> Vec<Vec<Place>> {
+    let mut on_lines: BTreeSet<(bool, i32, i32)> = BTreeSet::new();
+    for place in outline.places() {
+        let [row, col] = site.lines_at(place);
+        on_lines.extend(row.then_some((true, place.row, place.col)));
+        on_lines.extend(col.then_some((false, place.col, place.row)));
+    }
+    let mut of_rings: HashSet<(Place, Place)> = HashSet::new();
+    for places in outline.rings.iter().map(|ring| &ring.places) {
+        of_rings.extend(places.iter().copied().zip(places.iter().copied().cycle().skip(1)));
+    }
+    let post = site.lattice.steps_per_post() as usize;
+    let on_lines: Vec<(bool, i32, i32)> = on_lines.into_iter().collect();
+    let chord = |pair: &[(bool, i32, i32)]| {
+        let [(is_row, line, from), (other, other_line, to)] = [pair[0], pair[1]];
+        let place = |at: i32| if is_row { Place::new(line, at) } else { Place::new(at, line) };
+        let (a, b) = (place(from), place(to));
+        let is_chord = (is_row, line) == (other, other_line)
+            && (post as i32) < to - from
+            && !of_rings.contains(&(a, b))
+            && !of_rings.contains(&(b, a))
+            && outline.rings.iter().filter(|ring| encloses(&ring.places, place(from.midpoint(to)))).count() % 2 == 1;
+        is_chord.then(|| (from..to).step_by(post).map(place).chain([b]).collect())
+    };
+    on_lines.windows(2).filter_map(chord).collect()
 }
 
 /// An outline whose heights are those of the ground.
@@ -438,11 +480,31 @@ mod tests {
         let rounded = rounded(vec![lake(1, "water=river", 10.0, 30.0)]);
         let place = |east: f64| site().lattice.place_of([east, 20.0]).unwrap();
         let line = [([place(10.0), place(30.0)], [2000, 1000])];
-        let strand = &banks(&rounded.outlines[0], &line)[0];
+        let strand = &banks(&rounded.outlines[0], &line, &site())[0];
         for (place, height) in &strand.stations {
             let east = site().lattice.posts_of(*place)[0];
             assert_eq!(*height, 2500 - (east * 50.0) as i32);
         }
         assert_eq!(shore(&rounded.outlines[0], 7)[0].stations[3].1, 7);
+    }
+
+    #[test]
+    fn water_that_falls_along_a_load_module_line_falls_on_the_line_as_well() {
+        let ring = [(10.0, 40.0), (30.0, 40.0), (30.0, 60.0), (10.0, 60.0), (10.0, 40.0)];
+        let rounded = rounded(vec![way(1, "natural=water water=river", &ring)]);
+        let place = |east: f64| site().lattice.place_of([east, 49.0]).unwrap();
+        let line = [
+            ([place(10.0), place(18.0)], [2000, 2000]),
+            ([place(18.0), place(22.0)], [2000, 1000]),
+            ([place(22.0), place(30.0)], [1000, 1000]),
+        ];
+        let all = banks(&rounded.outlines[0], &line, &site());
+        let row = site().lattice.place_of([10.0, 50.0]).unwrap().row;
+        let along = |strand: &&Strand| strand.stations.iter().all(|(place, _)| place.row == row);
+        let [chord] = all[1..].iter().filter(along).collect::<Vec<_>>()[..] else { panic!("one along the row") };
+        let heights: Vec<i32> = chord.stations.iter().map(|(_, height)| *height).collect();
+        assert_eq!(heights, [2000, 2000, 1000, 1000]);
+        let easts: Vec<f64> = chord.stations.iter().map(|(place, _)| site().lattice.posts_of(*place)[0]).collect();
+        assert_eq!(easts, [10.0, 18.0, 22.0, 30.0]);
     }
 }

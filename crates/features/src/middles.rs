@@ -37,12 +37,13 @@ const TOLERANCE_OUT: Tolerance = Tolerance::ALL[1];
 const OFF_MAX: i32 = 32;
 
 /// The middle lines of a network that was cut into `pieces`, of which `wide` are strips, and of all strands, of which
-/// `thinned` are in the ground, whose heights were decided at `points` and on `faces`.
+/// `thinned` are in the ground, whose heights were decided at `points` and on `faces`. Decks come down, or up, to where
+/// a line that they go on in is laid.
 pub(crate) fn middles(
     graded: &Graded,
     (pieces, wide): (&[Piece], &[Wide]),
     (strands, thinned): (&[Strand], &[Strand]),
-    (points, faces): (&[(Place, i32)], &[Face]),
+    (points, faces, decks): (&[(Place, i32)], &[Face], &mut [Face]),
     site: &Site,
 ) -> Vec<Middle> {
     let mut middles = of_pieces(graded, pieces, wide);
@@ -58,7 +59,8 @@ pub(crate) fn middles(
         middles.extend(left_out(strand, kept, site).into_iter().map(|strand| of_strand(strand, false)));
     }
     middles.iter_mut().for_each(|middle| cross_lines(&mut middle.stations, site));
-    lay(&mut middles, points, (faces, site));
+    let laid = lay(&mut middles, points, (faces, site));
+    lay_decks(decks, graded, &laid);
     let mut middles: Vec<Middle> = middles.into_iter().flat_map(|middle| in_culverts(middle, points)).collect();
     middles.retain(|middle| 2 <= middle.stations.len());
     middles.sort();
@@ -169,8 +171,9 @@ fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
 }
 
 /// Lays lines in the ground onto it where another way has it: at places that lie as high as that way, and inside its
-/// strip. What another line has there at the same height moves with them, so that parts of a way still meet.
-fn lay(middles: &mut [Middle], points: &[(Place, i32)], (faces, site): (&[Face], &Site)) {
+/// strip. What another line has there at the same height moves with them, so that parts of a way still meet. Returns the
+/// heights of places where they are laid, by what they were.
+fn lay(middles: &mut [Middle], points: &[(Place, i32)], (faces, site): (&[Face], &Site)) -> HashMap<(Place, i32), i32> {
     let (mut ground, mut inside) = (HashMap::new(), Vec::new());
     for Middle { traits, stations, .. } in middles.iter().filter(|of| is_laid(&of.traits) && of.traits.is_in_ground) {
         for &(place, height) in stations {
@@ -196,6 +199,19 @@ fn lay(middles: &mut [Middle], points: &[(Place, i32)], (faces, site): (&[Face],
     }
     for station in middles.iter_mut().filter(|middle| is_laid(&middle.traits)).flat_map(|of| &mut of.stations) {
         station.1 = ground.get(station).copied().unwrap_or(station.1);
+    }
+    ground
+}
+
+/// Moves the ends of decks as the stations of lines were.
+fn lay_decks(decks: &mut [Face], graded: &Graded, laid: &HashMap<(Place, i32), i32>) {
+    let station = |node: &u32| (graded.network.nodes[*node as usize].place, graded.heights[*node as usize]);
+    for Face { corners, nodes, .. } in decks {
+        let ends: Vec<(Place, i32)> = nodes.iter().map(station).collect();
+        for corner in corners {
+            let nearest = ends.iter().filter(|end| end.1 == corner.1).min_by_key(|end| end.0.squared_to(corner.0));
+            corner.1 = nearest.and_then(|end| laid.get(end)).copied().unwrap_or(corner.1);
+        }
     }
 }
 

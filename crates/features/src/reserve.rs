@@ -251,7 +251,8 @@ fn shape(choice: &Choice, chosen: &Chosen, strands: &[Strand], formed: &mut Form
             }),
             Part::Strands(numbers) => {
                 let outlines = numbers.iter().map(|number| &strands[*number as usize]);
-                formed.shaped.extend(outlines.filter(|strand| strand.role.is_outline()).map(|strand| Surface {
+                let rings = outlines.filter(|strand| strand.role.is_outline() && strand.is_closed());
+                formed.shaped.extend(rings.map(|strand| Surface {
                     class: strand.class,
                     role: strand.role,
                     ring: strand.stations[1..].to_vec(),

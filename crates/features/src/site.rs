@@ -78,7 +78,12 @@ impl Site {
 
     /// Whether a place lies on a tile line or a load-module line.
     pub fn on_line(&self, place: Place) -> bool {
-        self.line_steps().iter().any(|steps| place.row % steps == 0 || place.col % steps == 0)
+        self.lines_at(place).contains(&true)
+    }
+
+    /// Whether a tile line or a load-module line runs through a place from west to east, and from south to north.
+    pub(crate) fn lines_at(&self, place: Place) -> [bool; 2] {
+        [place.row, place.col].map(|at| self.line_steps().iter().any(|steps| at % steps == 0))
     }
 
     /// The load module (row, column) that holds a place; those west and south of the area are negative.

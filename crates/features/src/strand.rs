@@ -81,6 +81,13 @@ pub struct Strand {
     pub stations: Vec<(Place, i32)>,
 }
 
+impl Strand {
+    /// Whether it ends where it begins.
+    pub fn is_closed(&self) -> bool {
+        self.stations.first().map(|(place, _)| place) == self.stations.last().map(|(place, _)| place)
+    }
+}
+
 /// The heights of a network, and what they are formed by.
 #[derive(Clone, Copy)]
 pub struct Graded<'a> {

@@ -23,7 +23,7 @@ const BANK_RUN: f64 = 2.0;
 
 /// Pieces of channels, shores and banks that lie off the natural ground at one of their ends at least.
 pub(crate) fn watersides(strands: &[Strand], ground: &dyn Fn(Place) -> Option<i32>) -> Vec<SideSlope> {
-    let is_water = |strand: &&Strand| matches!(strand.role, Role::Channel | Role::Shore | Role::Bank);
+    let is_water = |strand: &&Strand| strand.role == Role::Channel || strand.role.is_outline() && strand.is_closed();
     let pieces = strands.iter().filter(is_water).flat_map(|strand| strand.stations.windows(2));
     let waterside = |pair: &[(Place, i32)]| {
         let ends = [pair[0], pair[1]].map(|(place, height)| Vertex { at: place.into(), height });

@@ -156,18 +156,19 @@ typedef struct {
 
 /* Which objects lmr_sight_past looks at, and what hides. */
 enum { LMR_NO_OBJECTS = 0, LMR_BUILDINGS = 1, LMR_ALL_OBJECTS = 2 };
-enum { LMR_BY_GROUND = 1, LMR_BY_DECK = 2, LMR_BY_BUILDING = 3, LMR_BY_WOOD = 4, LMR_BY_ROW = 5 };
+enum { LMR_BY_GROUND = 1, LMR_BY_DECK = 2, LMR_BY_BUILDING = 3, LMR_BY_WOOD = 4, LMR_BY_ROW = 5,
+    LMR_BY_WALL = 6 };
 
 typedef struct {
     double share;                     /* how far along the line is hidden; 1 where it is not */
     double transmission;              /* the share of light that woods leave */
     double wood_m;                    /* metres inside woods */
-    uint8_t hidden_by;                /* 0, or LMR_BY_GROUND to LMR_BY_ROW */
+    uint8_t hidden_by;                /* 0, or LMR_BY_GROUND to LMR_BY_WALL */
 } lmr_sighting;
 
 typedef struct {
     double height_m;
-    uint8_t of;                       /* LMR_BY_GROUND to LMR_BY_ROW */
+    uint8_t of;                       /* LMR_BY_GROUND to LMR_BY_WALL */
 } lmr_top;
 
 /* What stands in a vehicle's way. */

@@ -56,7 +56,7 @@ pub struct Canopy {
     fullness: u8,
 }
 
-/// `LMR_BY_GROUND` to `LMR_BY_ROW`; 0 is nothing.
+/// `LMR_BY_GROUND` to `LMR_BY_WALL`; 0 is nothing.
 fn number_of(hider: Hider) -> u8 {
     hider as u8 + 1
 }

@@ -354,7 +354,7 @@ static void ask_sight(const lmr_ground *ground, const lmr_frame *frame, double h
     expect(past == LMR_INVALID || sight != LMR_HIDDEN || past == LMR_HIDDEN, "objects hide, and show nothing");
     if (lmr_sight_past(ground, ends[0], ends[1], LMR_ALL_OBJECTS, 0.5, &found) != LMR_UNKNOWN) {
         expect(0 <= found.share && found.share <= 1 && 0 <= found.transmission && found.transmission <= 1, "shares");
-        expect(0 <= found.wood_m && found.hidden_by <= LMR_BY_ROW, "woods and what hides");
+        expect(0 <= found.wood_m && found.hidden_by <= LMR_BY_WALL, "woods and what hides");
     }
     lmr_obstacle obstacle;
     double radius = below(4) ? (double)below(100) : odd_double();
@@ -372,7 +372,7 @@ static void ask_below(const lmr_ground *ground, const double place[2], int found
     expect(!found || on_ground <= top, "the ground or a deck above it");
     lmr_top highest;
     expect(lmr_top_at(ground, place[0], place[1], &highest) == found, "what lies on top");
-    expect(!found || (top <= highest.height_m && LMR_BY_GROUND <= highest.of && highest.of <= LMR_BY_ROW), "its kind");
+    expect(!found || (top <= highest.height_m && LMR_BY_GROUND <= highest.of && highest.of <= LMR_BY_WALL), "its kind");
     double ceiling = below(3) ? (below(2) ? on_ground : top) + (double)below(9) - 4 : odd_double();
     const double places[1][3] = {{place[0], place[1], ceiling}};
     double height = 0;

@@ -57,13 +57,15 @@ pub enum Hider {
     Building,
     /// A wood, scrub or an orchard, or several.
     Wood,
-    /// A wall, a hedge or a row of trees.
+    /// A hedge or a row of trees.
     Row,
+    /// A wall.
+    Wall,
 }
 
 impl Hider {
     /// All of them, in order.
-    pub const ALL: [Self; 5] = [Self::Ground, Self::Deck, Self::Building, Self::Wood, Self::Row];
+    pub const ALL: [Self; 6] = [Self::Ground, Self::Deck, Self::Building, Self::Wood, Self::Row, Self::Wall];
 
     /// The word for it.
     pub const fn name(self) -> &'static str {
@@ -73,13 +75,15 @@ impl Hider {
             Self::Building => "building",
             Self::Wood => "wood",
             Self::Row => "row",
+            Self::Wall => "wall",
         }
     }
 
     pub(crate) const fn of(kind: ObjectKind) -> Self {
         match kind {
             ObjectKind::Building | ObjectKind::Tower => Self::Building,
-            ObjectKind::Wall | ObjectKind::Row => Self::Row,
+            ObjectKind::Wall => Self::Wall,
+            ObjectKind::Row => Self::Row,
             ObjectKind::Wood | ObjectKind::Scrub | ObjectKind::Orchard => Self::Wood,
         }
     }

@@ -50,16 +50,16 @@ impl<S: Simd> Growth<'_, S> {
         if let Some(squares) = &squares {
             witness.squares(squares.sum);
         }
-        loop {
+        let reason = loop {
             if self.sequence.is_full(stop.points) || self.gate.is_spent() {
-                return StopReason::BudgetSpent;
+                break StopReason::BudgetSpent;
             }
             if squares.as_ref().is_some_and(RunningSquares::reached) {
-                return StopReason::RmsReached;
+                break StopReason::RmsReached;
             }
-            let Some(top) = queue.pop(&self.mesh) else { return StopReason::Exhausted };
+            let Some(top) = queue.pop(&self.mesh) else { break StopReason::Exhausted };
             if stop.value.is_some_and(|value| criterion.gain(top.key) <= value as f64) {
-                return StopReason::ResidualReached;
+                break StopReason::ResidualReached;
             }
             let Some(post) = self.located(criterion, &mut queue, top) else { continue };
             self.select(post, top.triangle);
@@ -69,7 +69,11 @@ impl<S: Simd> Growth<'_, S> {
                 squares.update(&self.ground, &self.mesh);
                 witness.squares(squares.sum);
             }
+        };
+        if let Some(squares) = squares {
+            witness.squares_left(squares.left(&self.mesh));
         }
+        reason
     }
 
     /// Computes the key of every triangle.
@@ -153,6 +157,12 @@ impl RunningSquares {
 
     pub fn reached(&self) -> bool {
         self.sum <= self.goal
+    }
+
+    /// What of the sum lies in triangles without a post to choose.
+    pub fn left(&self, mesh: &Mesh) -> f64 {
+        let of_triangles = self.of_triangle.iter().zip(mesh.triangles());
+        of_triangles.filter(|(_, triangle)| triangle.key == 0).map(|(squares, _)| squares).sum()
     }
 
     /// Accounts for the triangles the last insertion wrote.

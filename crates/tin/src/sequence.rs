@@ -10,6 +10,9 @@ pub(crate) trait Witness {
 
     /// Told, where the job asks for an RMS residual, what the sum of squared residuals has come to.
     fn squares(&mut self, _sum: f64) {}
+
+    /// Told at the end how much of that sum lies in triangles that no post may be chosen in.
+    fn squares_left(&mut self, _sum: f64) {}
 }
 
 /// Witnesses nothing.

@@ -45,6 +45,11 @@ pub fn survey(dem: &Dem, importance: &Importance, task: &SurveyTask, level: Leve
     let mut recorder = Recorder::new(task);
     let start = Start::new(&task.growth);
     let _ = dispatch!(level, simd => grow(simd, dem, importance, &task.growth, start, &mut recorder));
+    let is_masked = || dem.rect().posts().any(|post| importance.weight(post) == 0 && !dem.is_void(post));
+    if 0.0 < recorder.left && is_masked() {
+        // What weighs nothing is left on purpose.
+        recorder.left = 0.0;
+    }
     recorder.into_curve(task.growth.tile)
 }
 
@@ -56,6 +61,8 @@ struct Recorder {
     bin: i32,
     runs: Vec<GainRun>,
     squares: Vec<(i32, f64)>,
+    /// Of the sum of squares, what no post can lower: walls beside features, which the tile will have as edges.
+    left: f64,
 }
 
 impl Recorder {
@@ -65,7 +72,8 @@ impl Recorder {
         let south_west = terrain::ModuleId { row: module(rect.south), col: module(rect.west) };
         let (rows, cols) = (module(rect.cells_high() as i32), module(rect.cells_wide() as i32));
         let lines = ModuleLines { side: side_cells, south_west, rows, cols, reach: task.grid.all() };
-        Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs: Vec::new(), squares: Vec::new() }
+        let (runs, squares) = Default::default();
+        Self { rect, lines, owned: task.owned, cost: task.cost, bin: i32::MAX, runs, squares, left: 0.0 }
     }
 
     fn is_ours(&self, post: LocalPost) -> bool {
@@ -87,6 +95,7 @@ impl Recorder {
             run.cost += if same { next.cost } else { 0 };
             same
         });
+        self.squares.iter_mut().for_each(|(_, sum)| *sum = (*sum - self.left).max(0.0));
         GainCurve { tile, runs: self.runs, squares: self.squares }
     }
 }
@@ -97,6 +106,10 @@ impl Witness for Recorder {
             Some((bin, latest)) if *bin == self.bin => *latest = sum,
             _ => self.squares.push((self.bin, sum)),
         }
+    }
+
+    fn squares_left(&mut self, sum: f64) {
+        self.left = sum;
     }
 
     fn selected(&mut self, post: LocalPost, gain: f64) {

@@ -61,7 +61,7 @@ fn all_stages(sources: Vec<Source>, metres: &dyn Fn(f64, f64) -> f64, most: u32)
     }
     let lines = lines_inside(&rounded.outlines, &waters.banks, &rivers, &fallen, &site);
     for (number, line) in waters.banks.iter().zip(&lines) {
-        strands.extend(banks(&rounded.outlines[*number as usize], line));
+        strands.extend(banks(&rounded.outlines[*number as usize], line, &site));
     }
     for &number in &waters.outlines_only {
         strands.extend(outline_only(&rounded.outlines[number as usize], &shores[number as usize]));

@@ -44,8 +44,8 @@ class LineOfSight:
         How far the whole line stays above the ground at least, in metres; negative where the ground rises above it,
         NaN where it leaves the area. Decks of bridges and objects are not counted.
     hidden_by : ndarray of str, shape (...)
-        ``"ground"``, ``"deck"``, ``"building"``, ``"wood"`` or ``"row"`` (a wall, hedge or row of trees); empty where
-        nothing hides.
+        ``"ground"``, ``"deck"``, ``"building"``, ``"wood"``, ``"row"`` (a hedge or row of trees) or ``"wall"``; empty
+        where nothing hides.
     transmission : ndarray of float64, shape (...)
         The share of light that woods leave on the way to the target, or to the first thing that lets none through.
     """

@@ -224,7 +224,7 @@ fn line_of_sight() -> Value {
                     "blocked_at": or_null("number", "share of the line at which it ends: at something, or in woods \
                         where less than half of the light is left"),
                     "blocker": or_null("array", "east, north and height of the line there"),
-                    "hidden_by": or_null("string", "what it ends at: ground, deck, building, wood or row"),
+                    "hidden_by": or_null("string", "what it ends at: ground, deck, building, wood, row or wall"),
                     "transmission": or_null("number", "share of light that woods leave on the way"),
                     "wood_m": or_null("number", "metres of the line inside woods"),
                     "ends": list(numbers(3), "with above_ground: east, north and height of both ends"),
@@ -248,7 +248,7 @@ fn line_of_sight() -> Value {
             "little-endian 64-bit floats, six for each line",
             "little-endian 64-bit floats, five for each line: 1 visible, 0 not, NaN unknown; share of the line at \
              which it is blocked; least height above the ground in metres; what hides it, 0 ground, 1 deck, 2 \
-             building, 3 wood, 4 row; share of light that woods leave; NaN where there is none",
+             building, 3 wood, 4 row, 5 wall; share of light that woods leave; NaN where there is none",
         ],
         answer,
     )
