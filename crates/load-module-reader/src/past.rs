@@ -1,8 +1,8 @@
 //! Lines of sight past what stands on the ground: prisms hide, canopies take light away.
 
-use crate::lookup::{Lookup, STEPS};
+use crate::lookup::Lookup;
 use crate::objects::ObjectKind;
-use crate::sight::{Curvature, Line, crossed_at, hidden_at, part_over};
+use crate::sight::{Curvature, Line, crossed_at, hidden_at, part_over, steps_of};
 use crate::{LoadedGround, Prism, QUANTA_PER_METRE, Sight, TerrainModule};
 
 /// Which objects a line of sight looks at.
@@ -159,9 +159,7 @@ impl LoadedGround {
 
 /// Height of the ground in quanta at a place in quanta of a load module.
 fn ground_under(module: &TerrainModule, side: u16, place: [f64; 2]) -> f64 {
-    let end = i64::from(side) * STEPS;
-    let steps = place.map(|quanta| ((quanta * STEPS as f64).round() as i64).clamp(0, end));
-    module.lookup().height_m(steps).map_or(f64::NEG_INFINITY, |height_m| height_m * f64::from(QUANTA_PER_METRE))
+    module.lookup().height_m(steps_of(place, side)).map_or(f64::NEG_INFINITY, |height_m| height_m * f64::from(QUANTA_PER_METRE))
 }
 
 fn length_m(from_m: [f64; 3], to_m: [f64; 3]) -> f64 {
@@ -298,6 +296,11 @@ pub(crate) fn over_canopies(
     wanted: impl Fn(u32, u32) -> bool,
     parts: &mut Vec<Part>,
 ) {
+    if line.length_squared == 0.0 {
+        let over = lookup.triangles(steps_of(line.start, side));
+        parts.extend(over.map(|(corners, ..)| Part { canopy: corners[0][2], from: 0.0, to: 1.0 }));
+        return;
+    }
     lookup.triangles_along_in(side, line.start, end, wanted, |corners| {
         if let Some([from, to]) = part_over(&corners, line).map(|ends| ends.map(|end| end[0]))
             && from < to
@@ -343,8 +346,7 @@ fn below_top(
     let per_metre = -(1.0 - f64::from(canopy.fullness) / 100.0).ln() / DEPTH_M;
     let by = Hider::of(canopy.kind);
     let wanted = |row, col| wanted(canopy.height, row, col);
-    module.lookup().triangles_along_in(side, line.place(part.from), line.place(part.to), wanted, |corners| {
-        let Some([from, to]) = part_over(&corners, line) else { return };
+    let mut below = |[from, to]: [[f64; 2]; 2]| {
         // How far the line is above the top; along so short a way the earth's curvature is nothing.
         let above = |[at, ground]: [f64; 2]| line.height(at) - ground - f64::from(canopy.height);
         let (a, b) = (above(from), above(to));
@@ -358,5 +360,12 @@ fn below_top(
         if from < to {
             stretches.push(Stretch { canopy: part.canopy, from, to, per_metre, by });
         }
+    };
+    if line.length_squared == 0.0 {
+        let ground = ground_under(module, side, line.start);
+        return below([[0.0, ground], [1.0, ground]]);
+    }
+    module.lookup().triangles_along_in(side, line.place(part.from), line.place(part.to), wanted, |corners| {
+        part_over(&corners, line).into_iter().for_each(&mut below);
     });
 }

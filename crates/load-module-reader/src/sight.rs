@@ -123,8 +123,18 @@ pub(crate) fn hidden_at(lookup: &Lookup, side: u16, line: &Line) -> f64 {
     let mut nearest = f64::INFINITY;
     if 0.0 < line.length_squared {
         lookup.triangles_along(side, line.start, line.end, |corners| nearest = nearest.min(risen_at(&corners, line)));
+    } else if let Some(height_m) = lookup.height_m(steps_of(line.start, side)) {
+        // Straight up or down.
+        let [before, after] = line.heights.map(|height| height - height_m * f64::from(QUANTA_PER_METRE));
+        nearest = if 0.0 <= before && after < 0.0 { before / (before - after) } else { nearest };
     }
     nearest
+}
+
+/// The steps of a place in quanta of a load module.
+pub(crate) fn steps_of(place: [f64; 2], side: u16) -> [i64; 2] {
+    let end = i64::from(side) * STEPS;
+    place.map(|quanta| ((quanta * STEPS as f64).round() as i64).clamp(0, end))
 }
 
 /// Where along a line one triangle first rises above it; infinity where it does not.
@@ -239,10 +249,8 @@ pub(crate) fn part_over(corners: &Corners, line: &Line) -> Option<[[f64; 2]; 2]>
 
 /// The same of a line straight up or down.
 fn crossed_upright(decks: &Lookup, side: u16, line: &Line) -> f64 {
-    let end = i64::from(side) * STEPS;
-    let place = line.start.map(|quanta| ((quanta * STEPS as f64).round() as i64).clamp(0, end));
     let mut nearest = f64::INFINITY;
-    for (_, height_m, _) in decks.triangles(place) {
+    for (_, height_m, _) in decks.triangles(steps_of(line.start, side)) {
         let height = height_m * f64::from(QUANTA_PER_METRE);
         let [before, after] = line.heights.map(|line| above(line, height));
         if (0.0 <= before) != (0.0 <= after) {

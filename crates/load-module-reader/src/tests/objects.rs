@@ -228,6 +228,34 @@ fn a_wood_hides_where_less_light_than_asked_is_left() {
 }
 
 #[test]
+fn a_line_straight_down_meets_what_one_a_millimetre_off_meets() {
+    let (ground, _) = ground_with(scattered(5, &rough(9, 7)));
+    let mut draw = Rng::with_seed(8);
+    let past = PastObjects { least: 0.9, ..PastObjects::all(Curvature::NONE) };
+    let mut hidden = [0; 3];
+    for _ in 0..3000 {
+        let place = [CORNER[0] + 2.0 + 496.0 * draw.f64(), CORNER[1] + 2.0 + 496.0 * draw.f64()];
+        let [from, to] = [200.0 + 100.0 * draw.f64(), 200.0 * draw.f64()];
+        let sighted = |off: f64| {
+            let line = [[place[0], place[1], from], [place[0] + off, place[1], to]];
+            ground.sight_past(line[0], line[1], &past)
+        };
+        let (plumb, near) = (sighted(0.0), sighted(1e-6));
+        let same = |a: f64, b: f64| (a - b).abs() < 1e-4;
+        let same_end = match (plumb.sight, near.sight) {
+            (Sight::Hidden(a), Sight::Hidden(b)) => same(a, b),
+            (a, b) => a == b,
+        };
+        assert!(same_end && plumb.by == near.by, "{place:?} {from} {to}: {plumb:?} {near:?}");
+        assert!(same(plumb.transmission, near.transmission) && same(plumb.wood_m, near.wood_m), "{plumb:?} {near:?}");
+        for (count, by) in hidden.iter_mut().zip([Hider::Ground, Hider::Building, Hider::Wood]) {
+            *count += usize::from(plumb.by == Some(by));
+        }
+    }
+    assert!(hidden.iter().all(|count| 20 < *count), "{hidden:?}");
+}
+
+#[test]
 fn without_objects_answers_are_those_of_the_ground_bit_by_bit() {
     let (ground, _) = ground_with(scattered(5, &rough(9, 7)));
     let mut draw = Rng::with_seed(2);
