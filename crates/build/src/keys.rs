@@ -275,11 +275,13 @@ pub fn kept_features(refinement: &Refinement) -> Option<String> {
 
 /// Of a tile's gain curve.
 pub(crate) fn curve(window: &Window, task: &SurveyTask) -> Key {
-    let SurveyTask { growth, owned, grid, cost } = task;
+    let SurveyTask { growth, owned, grid, cost, counts_left } = task;
     let ModuleGrid { rows, cols, side_cells } = *grid;
-    let unit = match cost {
-        CostUnit::Triangles => 0,
-        CostUnit::Points => 1,
+    let unit = match (cost, counts_left) {
+        (CostUnit::Triangles, true) => 0,
+        (CostUnit::Points, true) => 1,
+        (CostUnit::Triangles, false) => 2,
+        (CostUnit::Points, false) => 3,
     };
     window
         .key("survey")

@@ -79,6 +79,8 @@ pub(crate) fn prepare(
     let told = findings.told();
     report.features = told.as_ref().map(|told| told.report.clone());
     report.objects = run.outlines.as_ref().map(|(_, outlines)| objects_report(run, outlines));
+    let posts: Vec<u64> = report.classes.iter().map(|class| class.posts).collect();
+    report.warnings.extend(crate::ground::idle_areas(run.job, &run.area, &posts, (&run.workers, run.stop))?);
     let features = run.level.as_ref().map(|settled| (run.job, &settled.level));
     report.warnings.extend(crate::product::warnings(&Made { report: &report, features }));
     let mut manifest = beginning(run);

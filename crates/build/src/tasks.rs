@@ -177,7 +177,10 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: 
         _ => Rule::WorstFirst,
     };
     let owned = with_outer_sides(job, area, tile, area.tiling.owned_sides(tile));
-    SurveyTask { growth, owned, grid: area.grid, cost }
+    let weighs_nothing = |weight: u16| weight == 0;
+    let is_masked = weighs_nothing(job.importance.default_weight)
+        || job.importance.areas.iter().any(|area| weighs_nothing(area.weight));
+    SurveyTask { growth, owned, grid: area.grid, cost, counts_left: is_masked || job.features.is_none() }
 }
 
 /// The largest residual at which a survey ends: where it ends the choosing and no RMS residual does, a tile gets what

@@ -328,7 +328,7 @@ fn a_checkerboard_lies_on_the_ground_where_it_lies_in_its_photo() {
     let view = &document["bufferViews"][number(&document["images"][0]["bufferView"])];
     let start = number(&view["byteOffset"]);
     let (texels, wide, high) = decoded(&binary[start..start + number(&view["byteLength"])]);
-    assert_eq!((wide, high), (1001, 501), "one texel on each metre, the borders among them");
+    assert_eq!((wide, high), (1002, 502), "one texel to each metre, and one beyond each border");
     assert_eq!(document["samplers"][0]["wrapS"], 33071);
     let mut seen = 0;
     for mesh in document["meshes"].as_array().unwrap() {
@@ -369,12 +369,14 @@ fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
     let of = |west: u32| ModuleRect { south: 0, west, north: 1, east: west + 1 };
     let texture = |rect: ModuleRect, texel_m: f64| decoded(&product.texture(rect, texel_m).unwrap().unwrap().bytes);
     let ((west, wide, high), (east, _, _)) = (texture(of(0), 0.0), texture(of(1), 0.0));
-    assert_eq!((wide, high), (501, 501));
-    let off = (0..high).map(|row| west[row * wide + wide - 1].abs_diff(east[row * wide])).max().unwrap();
+    assert_eq!((wide, high), (502, 502));
+    // The last two of the one are the first two of the other.
+    let of_both = |row: usize, at: usize| [west[row * wide + wide - 2 + at], east[row * wide + at]];
+    let off = (0..high).flat_map(|row| [of_both(row, 0), of_both(row, 1)]).map(|[a, b]| a.abs_diff(b)).max().unwrap();
     assert!(off < 40, "{off}, of 215 between dark and light");
     // Texels of 3 m do not divide a load module of 500 m: they are a little larger.
-    assert_eq!(texture(of(0), 3.0).1, 167);
-    assert_eq!(texture(product.rect, 700.0).1, 3);
+    assert_eq!(texture(of(0), 3.0).1, 168);
+    assert_eq!(texture(product.rect, 700.0).1, 4);
     let tiles = files(|put, work| crate::write_3dtiles(&product, None, put, work));
     let (document, _) = document(&tiles["groups/r0000c0000_r0000c0001.glb"]);
     assert_eq!(document["images"][0]["mimeType"], "image/jpeg");
@@ -386,7 +388,7 @@ fn textures_of_neighbours_agree_on_their_border_and_hold_to_a_size() {
 fn every_texel_is_that_of_the_photo_however_its_file_is_cut() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("noise.tif");
-    // Its pixels are as large as texels, and these have their middles on the corners between four of them.
+    // Its pixels are as large as texels, and lie where these do.
     let (pixel_m, cols, rows) = (0.3125, 3200_u32, 1600_u32);
     let grey = |col: u32, row: u32| -> u32 {
         let at = (row.min(rows - 1) * cols + col.min(cols - 1)).wrapping_mul(0x9e37_79b1);
@@ -401,12 +403,11 @@ fn every_texel_is_that_of_the_photo_however_its_file_is_cut() {
         let textures = Textures::open(std::slice::from_ref(&path), product.crs(), ends, None, file).unwrap();
         let product = Product { textures: Some(Arc::new(textures)), ..product };
         let bytes = product.texture(product.rect, 0.0).unwrap().unwrap().bytes;
-        let (wide, high) = (cols as usize + 1, rows as usize + 1);
+        let (wide, high) = (cols as usize + 2, rows as usize + 2);
         assert_eq!(bytes.len(), 512 + 3 * wide * high);
-        for (row, col) in (1..rows).flat_map(|row| (1..cols).map(move |col| (row, col))) {
-            let sum = grey(col - 1, row - 1) + grey(col, row - 1) + grey(col - 1, row) + grey(col, row);
-            let texel = u32::from(bytes[512 + (high - 1 - row as usize) * wide + col as usize]);
-            assert!((4 * texel).abs_diff(sum) <= 2, "{rows_per_strip}: {texel} at {col},{row}, expected {sum} / 4");
+        for (row, col) in (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))) {
+            let texel = u32::from(bytes[512 + (high - 2 - row as usize) * wide + col as usize + 1]);
+            assert_eq!(texel, grey(col, row), "{rows_per_strip}: at {col},{row}");
         }
         assert_eq!(product.textures.as_ref().unwrap().coarser_m(), None);
     }
@@ -441,10 +442,10 @@ fn a_draped_edge_bends_where_the_ground_does() {
     assert_eq!((back.len() <= 4, back[0][2], back[back.len() - 1][2]), (true, 127_872.0, 128_256.0));
 }
 
-/// Whether a place lies where its texture has it: 1001 x 501 texels, the first in the middle of the south-west corner.
+/// Whether a place lies where its texture has it: 1002 x 502 texels, the first south-west of the corner.
 #[track_caller]
 fn check_place([east, north]: [f64; 2], [u, v]: [f64; 2]) {
-    let expected = [(east + 0.5) / 1001.0, (north + 0.5) / 501.0];
+    let expected = [(east + 1.0) / 1002.0, (north + 1.0) / 502.0];
     assert!((expected[0] - u).abs() < 1e-6 && (expected[1] - v).abs() < 1e-6, "{east} {north}: {u} {v}, {expected:?}");
 }
 
@@ -459,7 +460,7 @@ fn engines_and_simulators_find_the_photo_where_their_vertices_lie() {
     let product = textured(folder.path(), samples::product(), 1.0);
 
     let usd = files(|put, work| crate::write_usd(&product, put, work));
-    assert_eq!(decoded(&usd["tiles/tile_r00c00.jpg"]).1, 1001);
+    assert_eq!(decoded(&usd["tiles/tile_r00c00.jpg"]).1, 1002);
     let text = String::from_utf8_lossy(&usd["tiles/tile_r00c00.usda"]).into_owned();
     let list = |name: &str| {
         let line = text.lines().find(|line| line.trim_start().starts_with(name)).unwrap_or_else(|| panic!("{text}"));
@@ -471,7 +472,7 @@ fn engines_and_simulators_find_the_photo_where_their_vertices_lie() {
     assert!(text.contains("@./tile_r00c00.jpg@") && text.contains("Photo.outputs:rgb"));
 
     let flt = files(|put, work| crate::write_openflight(&product, put, work));
-    assert_eq!(decoded(&flt["squares/r00c00.jpg"]).1, 1001);
+    assert_eq!(decoded(&flt["squares/r00c00.jpg"]).1, 1002);
     let bytes = &flt["squares/r00c00.flt"];
     let (mut at, mut vertices, mut named) = (0, 0, false);
     while at < bytes.len() {
@@ -494,7 +495,7 @@ fn engines_and_simulators_find_the_photo_where_their_vertices_lie() {
 
     let gazebo = files(|put, work| crate::write_gazebo(&product, put, work));
     let name = gazebo.keys().find_map(|name| name.strip_suffix(".jpg")).unwrap().to_owned();
-    assert_eq!(decoded(&gazebo[&format!("{name}.jpg")]).1, 1001);
+    assert_eq!(decoded(&gazebo[&format!("{name}.jpg")]).1, 1002);
     let text = |end: &str| String::from_utf8_lossy(&gazebo[&format!("{name}.{end}")]).into_owned();
     let file = name.strip_prefix("meshes/").unwrap();
     assert!(text("mtl").contains(&format!("map_Kd {file}.jpg")));

@@ -69,8 +69,9 @@ pub(crate) struct Place {
     pub below: [u8; 3],
 }
 
-/// The texture of some load modules: its outermost texels have their middles on the borders of these, so that those
-/// of two units beside each other have the same.
+/// The texture of some load modules, whose borders run between texels: where a photo's pixels do, too, and are as large,
+/// texels are its pixels. One texel more lies beyond each border, so that what a program draws between the outermost two
+/// is the same in both of two units beside each other.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// Its file.
@@ -148,9 +149,9 @@ impl Textures {
             // Positive numbers have their bits in their order.
             self.largest_m.fetch_max(texel_m.to_bits(), Ordering::Relaxed);
         }
-        let texels = sides.map(|side| (side / texel_m - 1e-9).ceil() as usize + 1);
+        let texels = sides.map(|side| (side / texel_m - 1e-9).ceil() as usize + 2);
         let side = texels[0].max(texels[1]).next_multiple_of(SIDE_STEP);
-        let corner = [low_m[0] - texel_m / 2.0, high_m[1] + texel_m / 2.0];
+        let corner = [low_m[0] - texel_m, high_m[1] + texel_m];
         let square = Square { crs: &self.crs, corner, pixel_m: texel_m, side };
         let mut pixels = vec![0; 4 * side * side];
         for picture in &self.pictures {
@@ -173,7 +174,7 @@ impl Textures {
 
     /// The finest texel that a texture of so many metres may have: load modules have a whole number of them.
     pub(crate) fn texel_m(&self, module_m: f64, longest_m: f64, texel_m: f64) -> f64 {
-        let least = texel_m.max(self.texel_m).max(longest_m / (self.side_max - 1) as f64);
+        let least = texel_m.max(self.texel_m).max(longest_m / (self.side_max - 2) as f64);
         // Rounded down, a module has fewer texels, each of them longer.
         if least <= module_m { module_m / (module_m / least + 1e-9).floor() } else { least }
     }

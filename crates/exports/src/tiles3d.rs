@@ -32,6 +32,10 @@ use crate::product::is_band;
 use crate::skirts::{Depths, Side, Skirt, depths};
 use crate::{Datum, ExportError, Product, Put, Sheet, Texture, Work};
 
+/// Texels of a tile are no finer than this part of its error: where viewers go on to what is finer, at an error of 16
+/// pixels, a texel is two of these.
+const TEXELS_TO_ERROR: f64 = 1.0 / 8.0;
+
 /// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
 /// to take heights to be above; else the database says it. Returns what was done to heights.
 ///
@@ -203,7 +207,7 @@ impl Layers {
         for ((layer, shown), step) in self.layers.iter().zip(&shown).zip(&steps).skip(1) {
             let name = square_name(&layer.product, rect, "glb");
             let uri = format!("levels/{}/{name}", step.level);
-            let texture = layer.product.texture(rect, step.error_m)?;
+            let texture = layer.product.texture(rect, TEXELS_TO_ERROR * step.error_m)?;
             take(&uri, &|| layer.gltf(&frame, rect, shown, texture.clone()).bytes())?;
             let mut level = json!({
                 "boundingVolume": { "box": bounds },
@@ -226,7 +230,7 @@ impl Layers {
         put_children(&mut tile, children);
         if !coarse.triangles.is_empty() {
             let uri = format!("squares/{}", square_name(&finest.product, rect, "glb"));
-            let texture = finest.product.texture(rect, coarse.error_m)?;
+            let texture = finest.product.texture(rect, TEXELS_TO_ERROR * coarse.error_m)?;
             take(&uri, &|| {
                 let node = finest.node(&frame, group_name(rect), (&coarse.vertices, &skirt), texture.as_ref());
                 let nodes = vec![with_skirt(node, &coarse.triangles, &coarse.classes, &skirt)];

@@ -29,6 +29,9 @@ pub struct SurveyTask {
     pub grid: terrain::ModuleGrid,
     /// What a run's cost counts.
     pub cost: CostUnit,
+    /// Whether sums of squares count what no post can lower: ground that weighs nothing, but not walls beside features,
+    /// which the tile will have as edges.
+    pub counts_left: bool,
 }
 
 /// What the cost of a run counts.
@@ -45,9 +48,7 @@ pub fn survey(dem: &Dem, importance: &Importance, task: &SurveyTask, level: Leve
     let mut recorder = Recorder::new(task);
     let start = Start::new(&task.growth);
     let _ = dispatch!(level, simd => grow(simd, dem, importance, &task.growth, start, &mut recorder));
-    let is_masked = || dem.rect().posts().any(|post| importance.weight(post) == 0 && !dem.is_void(post));
-    if 0.0 < recorder.left && is_masked() {
-        // What weighs nothing is left on purpose.
+    if task.counts_left {
         recorder.left = 0.0;
     }
     recorder.into_curve(task.growth.tile)
@@ -61,7 +62,7 @@ struct Recorder {
     bin: i32,
     runs: Vec<GainRun>,
     squares: Vec<(i32, f64)>,
-    /// Of the sum of squares, what no post can lower: walls beside features, which the tile will have as edges.
+    /// Of the sum of squares, what no post can lower.
     left: f64,
 }
 

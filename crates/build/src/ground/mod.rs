@@ -36,6 +36,8 @@ pub use foresee::groups_needed;
 pub use foresee::{Needed, foresee, needed};
 mod locate;
 pub use locate::{Corner, corners, covered, find_area, rectangle_around, utm_of};
+mod idle_areas;
+pub use idle_areas::idle_areas;
 mod features_seen;
 pub use features_seen::{FeatureRow, FeatureTable, FeaturesSeen, SourceSeen, features_in};
 

@@ -351,7 +351,7 @@ impl<'a> TinJob<'a> {
         let importance = weights(window);
         // One load module as large as the raster: costs are points, and all are booked to it.
         let grid = ModuleGrid { rows: 1, cols: 1, side_cells: i32::from(u16::MAX) };
-        let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points };
+        let task = SurveyTask { growth, owned, grid, cost: CostUnit::Points, counts_left: true };
         tin::survey(window, &importance, &task, terrain::geometry::widest_level())
     }
 

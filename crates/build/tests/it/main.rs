@@ -22,6 +22,7 @@ mod features;
 mod forger;
 mod given;
 mod golden;
+mod idle_importance;
 mod incremental;
 mod levels;
 mod measures;
