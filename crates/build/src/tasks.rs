@@ -144,8 +144,13 @@ fn largest_value(job: &Job) -> Option<u64> {
     let quantum = if matches!(job.tin.method, Method::Paper { .. }) { job.tin.residual_quantum } else { 1 };
     let is_optimised = matches!(job.tin.method, Method::Optimised(_));
     let weight = if is_optimised { THOUSANDTHS } else { job.importance.lightest() };
-    let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor();
-    job.tin.max_residual_m.map(|metres| u64::from(weight) * units(metres) as u64)
+    job.tin.max_residual_m.map(|metres| u64::from(weight) * units_within(metres, quantum))
+}
+
+/// The most steps of so many quanta at which a residual, rounded to them, is surely no larger than so many metres.
+pub(crate) fn units_within(metres: f64, quantum: u32) -> u64 {
+    let rounded_away = if quantum == 1 { 0.0 } else { f64::from(quantum) / 2.0 };
+    ((metres * f64::from(terrain::QUANTA_PER_METRE) - rounded_away) / f64::from(quantum)).max(0.0) as u64
 }
 
 /// The survey of one tile: all it would select if it were alone.

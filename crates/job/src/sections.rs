@@ -381,7 +381,7 @@ const TIN: &[Key] = &[
         .number("metres", 0.0..=RESIDUAL_M_MAX)
         .otherwise("none")
         .example("max_residual_m = 10"),
-    Key::new("target_rms_m", "choosing ends at this RMS residual over the area")
+    Key::new("target_rms_m", "choosing ends at this RMS residual at the posts of the working grid")
         .number("metres", RMS_M_MIN..=RESIDUAL_M_MAX)
         .otherwise("none")
         .example("target_rms_m = 1.5"),

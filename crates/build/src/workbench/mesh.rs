@@ -20,6 +20,7 @@ use terrain::{
 use tin::tiling::{Gains, Tiling, points_equally, points_globally};
 use tin::{CostUnit, Proximity, Rule, Stop, SurveyTask, TileTask};
 
+use crate::tasks::units_within;
 use crate::workbench::heights::Heights;
 use crate::workbench::request::{TinMethod, TinRequest, TinStart, refuse};
 use crate::workbench::tally::{tally_of, tally_on_all, without_voids};
@@ -220,8 +221,7 @@ impl<'a> TinJob<'a> {
         refuse(request, (rows, cols), rect)?;
         let tiling = Tiling::new(rect, 1, rows, cols, TileOrder::Color);
         let quantum = if request.method == TinMethod::Paper { terrain::QUANTA_PER_METRE as u32 } else { 1 };
-        let units = |metres: f64| (metres * f64::from(terrain::QUANTA_PER_METRE) / f64::from(quantum)).floor() as u64;
-        let value = request.max_residual_m.map(|metres| u64::from(THOUSANDTHS) * units(metres));
+        let value = request.max_residual_m.map(|metres| u64::from(THOUSANDTHS) * units_within(metres, quantum));
         let rule = match request.method {
             TinMethod::Greedy { key: ErrorKey::Max } => Rule::WorstFirst,
             // A residual to reach is reached by worst posts; sums of squares alone would go past it.
