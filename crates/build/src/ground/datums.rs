@@ -30,9 +30,10 @@ pub fn judge_datums(
     area: &GamingArea,
     datums: &[(&SourceFile, Option<String>)],
 ) -> Result<Datums, GroundError> {
-    let known = datums.iter().find_map(|(_, datum)| datum.clone());
     let mut found = Datums { shifts: vec![None; datums.len()], warnings: Vec::new() };
-    let Some(wanted) = job.dem.vertical_datum.clone().or(known) else { return Ok(found) };
+    // Where no source says anything, the job's word stands for all.
+    let Some(known) = datums.iter().find_map(|(_, datum)| datum.clone()) else { return Ok(found) };
+    let wanted = job.dem.vertical_datum.clone().unwrap_or(known);
     let mut grids = Grids { job, area, read: Vec::new() };
     for (shift, (file, datum)) in found.shifts.iter_mut().zip(datums) {
         match datum {

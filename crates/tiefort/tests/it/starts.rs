@@ -128,16 +128,21 @@ fn heights_above_different_datums_are_not_mixed_and_unknown_ones_are_told() {
     let job = |dem: &str, said: &str| {
         format!(
             "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [506000, 3876000]\nsize_m = [2000, 2000]\n\
-             spacing_m = 25\n[dem]\n{dem}\nsources = [{{ file = \"a.asc\", crs = \"EPSG:32611\"{said} }}]\n\
+             spacing_m = 25\n[dem]\n{dem}\nsources = [{{ file = \"a.asc\", crs = \"EPSG:32611\"{said}]\n\
              [tin]\nmethod = \"optimised\"\n"
         )
     };
     let above = "vertical_datum = \"EGM96\"";
-    fs::write(scene.path("job.toml"), job(above, ", vertical_datum = \"ellipsoid\"")).unwrap();
+    fs::write(scene.path("job.toml"), job(above, ", vertical_datum = \"ellipsoid\" }")).unwrap();
     scene.refuses(&["build", "job.toml"], &["dem.vertical_datum", "ellipsoid", "EGM96", "geoid"]);
-    fs::write(scene.path("job.toml"), job(above, ", vertical_datum = \"egm 96\"")).unwrap();
+    fs::write(scene.path("job.toml"), job(above, ", vertical_datum = \"egm 96\" }")).unwrap();
     scene.run_to(0, &["build", "job.toml"]);
-    fs::write(scene.path("job.toml"), job(above, "")).unwrap();
+    // The job speaks for sources of which none says anything, and for none beside one that does.
+    fs::write(scene.path("job.toml"), job(above, " }")).unwrap();
+    scene.run_to(0, &["build", "job.toml", "--strict"]);
+    fs::copy(scene.path("a.asc"), scene.path("b.asc")).unwrap();
+    let beside = " }, { file = \"b.asc\", crs = \"EPSG:32611\", vertical_datum = \"EGM96\" }";
+    fs::write(scene.path("job.toml"), job(above, beside)).unwrap();
     let said = scene.run_to(0, &["build", "job.toml"]).stderr;
     assert!(said.contains("does not say what its heights are measured from"), "{said}");
 }
