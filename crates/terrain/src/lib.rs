@@ -42,6 +42,8 @@ mod materials;
 pub use materials::{FEATURE_COLORS, MaterialName, OBJECT_MATERIALS, named_class_color};
 mod draped;
 pub use draped::{Draped, Flat};
+mod bands;
+pub use bands::{Band, band_rings};
 mod each;
 pub use each::{Each, gather, in_turn};
 

@@ -5,6 +5,7 @@ use terrain::{
     Dem, HOLE_CLASS, LoadModule, ModuleGrid, ObjectKind, Post, QUANTA_PER_METRE, Spacing, Tin, metres_of_quanta,
 };
 
+use super::bands::bands_of;
 use super::map_extent::slope;
 use super::objects::{Solid, kinds, solids};
 use super::scene::{Scene, SceneFeatures};
@@ -27,6 +28,8 @@ pub struct Facets {
     pub(crate) decks: Vec<([[f64; 3]; 3], u8)>,
     /// Edges that are the middle of a road, a river or a stream, and their place among the colours of features.
     pub(crate) lines: Vec<([[f64; 3]; 2], u8)>,
+    /// Triangles of the bands that some of these are where one stands on the ground, a little above it.
+    pub(crate) bands: Vec<([[f64; 3]; 3], u8)>,
     /// What stands on the ground.
     pub(crate) objects: Vec<Solid>,
     /// Kinds of these.
@@ -63,6 +66,7 @@ impl Facets {
             covers: Vec::new(),
             decks: Vec::new(),
             lines: Vec::new(),
+            bands: Vec::new(),
             objects: Vec::new(),
             kinds: Vec::new(),
         }
@@ -71,6 +75,12 @@ impl Facets {
     /// Those of a scene.
     pub(crate) fn of_scene(scene: &Scene) -> Self {
         Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_covers_of(scene, scene.modules)
+    }
+
+    /// The facets of a scene with the bands of its ways, for an observer who is near them.
+    pub(crate) fn with_bands_of(self, scene: &Scene) -> Self {
+        let bands = scene.features.map(|features| bands_of(scene, &features)).unwrap_or_default();
+        Self { bands, ..self }
     }
 
     /// The facets of these load modules, told which of them lie over holes and which over water: those of a class.

@@ -7,6 +7,7 @@
 //! ```
 //! Pictures are pure: the same ground gives the same bytes, on any machine. What is absent: threads, files, clocks.
 
+mod bands;
 mod camera;
 mod color;
 mod depth;

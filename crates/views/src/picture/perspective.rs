@@ -324,8 +324,8 @@ impl Stage {
         }
     }
 
-    /// Lines of features, what stands on the ground, and bridges with sides that hang from them: else one seen from a
-    /// bank would be a line.
+    /// Lines of features and their bands, what stands on the ground, and bridges with sides that hang from them: else
+    /// one seen from a bank would be a line.
     fn draw_features(&mut self, surface: &Surface, times: f64) {
         let Surface::Triangles(facets) = surface else { return };
         let (view, half_m) = (self.view, self.haze_half_m);
@@ -337,6 +337,11 @@ impl Stage {
             turned: view.turned([x, y, z * times - down_m]),
             values: [0.0; 2],
         };
+        // After the lines, which show where bands are narrower than a pixel, and would lie on them elsewhere.
+        for (corners, number) in &facets.bands {
+            let paint = |_: [f64; 2], ahead: f64| mix(color(*number), HAZE, haze_share(ahead, half_m));
+            self.depth.triangle(&view, corners.map(|at| corner(at, 0.0)), &paint);
+        }
         for (corners, number) in &facets.decks {
             let paint = color(*number);
             let top = |_: [f64; 2], ahead: f64| mix(paint, HAZE, haze_share(ahead, half_m));

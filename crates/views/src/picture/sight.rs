@@ -48,7 +48,7 @@ const PITCH: f64 = -2.0;
 /// # Panics
 /// When the ground is asked for and the scene has none.
 pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide: usize) -> Image {
-    let facets = Facets::of_scene(scene);
+    let facets = Facets::of_scene(scene).with_bands_of(scene);
     let covers = scene.ground.map(|ground| facets.post_covers(ground.dem, scene.frame.spacing.metres()));
     let triangles = Surface::Triangles(&facets);
     let tin = || Panel { label: format!("TIN, {}", scene.triangles_in_words()), surface: triangles };
