@@ -3,6 +3,7 @@
 import { BufferAttribute } from "three";
 import { CASTS } from "./blocks.js";
 import { MADE } from "./colors.js";
+import { boxesOf, groundOf } from "./drape.js";
 import * as looks from "./materials.js";
 import { geometryOf, meshOf } from "./meshes.js";
 
@@ -93,22 +94,6 @@ function borderOf({ corners, triangles }, [west, south, east, north]) {
     if (!known.has(end(at) * 65536 + from) && !isCut(corners[from], corners[end(at)])) border.add(at);
   });
   return border;
-}
-
-/** West, south, east and north of places, four numbers for every three. */
-function boxesOf(count, x, y) {
-  const boxes = new Float32Array(4 * count);
-  for (let t = 0; t < count; t++) {
-    const [xs, ys] = [x, y].map((of) => [of(3 * t), of(3 * t + 1), of(3 * t + 2)]);
-    boxes.set([Math.min(...xs), Math.min(...ys), Math.max(...xs), Math.max(...ys)], 4 * t);
-  }
-  return boxes;
-}
-
-/** The triangles of a surface with the boxes around them. */
-function groundOf({ points, triangles }) {
-  const at = (axis) => (corner) => points[3 * triangles[corner] + axis];
-  return { points, triangles, boxes: boxesOf(triangles.length / 3, at(0), at(1)) };
 }
 
 /** The ground under a canopy in pieces, each inside one triangle of the surface; the whole triangle where all of it is

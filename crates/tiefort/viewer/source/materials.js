@@ -105,9 +105,10 @@ for (const { uniforms } of [blocks, leaves, trees]) {
   uniforms.softness = { value: 0 };
 }
 export const decks = groundMaterial([], { side: DoubleSide });
+// No offset by slope: far away on level ground that would be many metres, and shine through crests.
 export const ribbons = groundMaterial([], {
   vertexShader: RIBBON_VERTEX,
-  side: DoubleSide, polygonOffset: true, polygonOffsetFactor: -3, polygonOffsetUnits: -3,
+  side: DoubleSide, polygonOffset: true, polygonOffsetFactor: 0, polygonOffsetUnits: -2,
 });
 
 /** Sets what the palette says. */

@@ -1,12 +1,14 @@
 // From surfaces to what the renderer draws: east is x, up is y, south is z.
 import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, Mesh } from "three";
+import { DISC, joined } from "./bands.js";
 import { bytes, colorOf, GROUND, isWater, MADE, WATER } from "./colors.js";
+import { draped, groundOf, liesOn } from "./drape.js";
 import * as looks from "./materials.js";
 import { isSea } from "./server.js";
-import { triangleUnder } from "./surface.js";
 
-/** Metres that a ribbon is long at most, so that it follows the ground beside its line, and how far it lies above. */
-const RIBBON_M_MAX = 12, RIBBON_LIFT_M = 0.15, RIBBON_WIDTH_M_MIN = 2;
+/** Metres that ribbons lie above the ground, and how much more those of the first class do; how wide they are at least;
+ * how far beside the middle is still the middle. */
+const RIBBON_LIFT_M = 0.1, CLASSES_LIFT_M = 0.1, RIBBON_WIDTH_M_MIN = 2, MIDDLE_M = 0.02;
 const lines = new LineBasicMaterial({ color: 0xffe14d });
 
 /** Corners of a surface's triangles, one after the other, as the renderer has them: each triangle is lit as one. */
@@ -54,48 +56,109 @@ export function deckMesh(area, decks) {
   return meshOf(geometry, looks.decks);
 }
 
-/** Roads and streams of a load module that are lines of its TIN, as ribbons on the ground. */
+/** How far the ribbons of a class lie above the ground: where two cross, the class that comes first is on top. */
+const liftOf = (area, ofClass) => RIBBON_LIFT_M + CLASSES_LIFT_M * (1 - Math.min(ofClass / area.classes.length, 1));
+const halfOf = ({ width }) => Math.max(width, RIBBON_WIDTH_M_MIN) / 2;
+
+/** Corners of ribbons that become one mesh. */
+class Ribbons {
+  constructor(area) {
+    Object.assign(this, { area, positions: [], tints: [], asides: [] });
+  }
+
+  /** What a road puts here: a convex piece, corners [east, north, height], which lie beside its middle by `aside`. */
+  of({ class: of }) {
+    const lift = liftOf(this.area, of);
+    // Too narrow to mirror anything: seen flat, a stream would glitter.
+    const tint = [...bytes(colorOf.cover(this.area, of) ?? colorOf.deck()), MADE];
+    const put = ([east, north, height], [right, up]) => {
+      this.positions.push(east, height + lift, -north);
+      this.tints.push(...tint);
+      // South is z.
+      this.asides.push(right, -up);
+    };
+    return (piece, aside) => {
+      for (let i = 2; i < piece.length; i++) [0, i - 1, i].forEach((at) => put(piece[at], aside(piece[at])));
+    };
+  }
+
+  get count() {
+    return this.positions.length / 3;
+  }
+
+  mesh() {
+    const geometry = geometryOf(new Float32Array(this.positions));
+    geometry.getAttribute("tint").array.set(this.tints);
+    geometry.setAttribute("aside", new BufferAttribute(new Float32Array(this.asides), 2));
+    geometry.computeVertexNormals();
+    geometry.computeBoundingSphere();
+    return meshOf(geometry, looks.ribbons);
+  }
+}
+
+/** How far beside the middle of a road a place lies; on it where rounding alone says otherwise. */
+function asideOf({ ends: [a, b] }) {
+  const [right, up] = [b[0] - a[0], b[1] - a[1]], length = Math.hypot(right, up) || 1;
+  return ([east, north]) => {
+    const left = ((north - a[1]) * right - (east - a[0]) * up) / length;
+    return Math.abs(left) < MIDDLE_M ? [0, 0] : [(-up * left) / length, (right * left) / length];
+  };
+}
+
+/** The height of a road's middle beside a place. */
+function levelOf({ ends: [a, b] }) {
+  const [right, up, rise] = a.map((from, axis) => b[axis] - from), square = right * right + up * up || 1;
+  return ([x, y]) => a[2] + rise * Math.min(Math.max(((x - a[0]) * right + (y - a[1]) * up) / square, 0), 1);
+}
+
+/** The plans of a road's band, counter-clockwise: between its ends, and the discs there that join it to others. Each
+ * with how far beside the middle a place lies, and how high that is. */
+function plansOf(road, joints) {
+  const half = halfOf(road), [a, b] = road.ends, [from, to] = joints, level = levelOf(road);
+  const beside = ([east, north], [right, up], side) => [east + side * half * right, north + side * half * up];
+  const along = [beside(a, from.left, -1), beside(b, to.left, -1), beside(b, to.left, 1), beside(a, from.left, 1)];
+  const discs = [0, 1].filter((end) => joints[end].isDisc).map((end) => road.ends[end]);
+  return [{ plan: along, aside: asideOf(road), level }, ...discs.map((end) => ({
+    plan: DISC.map((corner) => beside(end, corner, 1)), aside: ([x, y]) => [x - end[0], y - end[1]], level,
+  }))];
+}
+
+/** The band between a road's ends in plans of so many metres at most. */
+function* piecesOf({ ends: [a, b] }, [right, farRight, farLeft, left], most) {
+  const pieces = Math.ceil(Math.hypot(b[0] - a[0], b[1] - a[1]) / most);
+  const at = (from, to, share) => from.map((start, axis) => start + share * (to[axis] - start));
+  for (let piece = 0; piece < pieces; piece++) {
+    const [near, far] = [piece / pieces, (piece + 1) / pieces];
+    yield [at(right, farRight, near), at(right, farRight, far), at(left, farLeft, far), at(left, farLeft, near)];
+  }
+}
+
+/** Roads and streams of a load module that are lines of its TIN, as ribbons cut along its triangles: level from side to
+ * side, as high as their middle, but where the ground is higher. */
 export function roadMesh(area, roads, surface) {
-  const on = (east, north, height) => Math.max(height, triangleUnder(surface, east, north)?.height ?? height);
-  return ribbonMesh(area, roads, RIBBON_M_MAX, on).mesh;
+  const ribbons = new Ribbons(area), ground = groundOf(surface), joints = joined(roads, halfOf);
+  roads.forEach((road, number) => {
+    const put = ribbons.of(road);
+    for (const { plan, aside, level } of plansOf(road, joints[number])) {
+      const over = ([x, y, height]) => [x, y, Math.max(level([x, y]), height ?? -Infinity)];
+      for (const piece of draped(ground, plan)) put(piece.map(over), aside);
+      // The ground beyond the load module is another's.
+      if (!liesOn(ground, plan)) put(plan.map(over), aside);
+    }
+  });
+  return ribbons.mesh();
 }
 
 /** Roads and streams as ribbons in pieces of so many metres at most, at the heights that `on` gives places, and how
- * many corners each has. */
+ * many corners each has: for ground that is far away, without discs. */
 export function ribbonMesh(area, roads, most, on) {
-  const positions = [], tints = [], asides = [], counts = [];
-  for (const { class: of, width, ends: [a, b] } of roads) {
-    const run = b.map((to, axis) => to - a[axis]), length = Math.hypot(run[0], run[1]);
-    counts.push(6 * Math.ceil(length / most));
-    if (length === 0) continue;
-    const half = Math.max(width, RIBBON_WIDTH_M_MIN) / 2;
-    const [right, up] = [(half * run[1]) / length, (-half * run[0]) / length];
-    const across = (share) => {
-      const [east, north, height] = a.map((from, axis) => from + share * run[axis]);
-      return [-1, 1].map((side) => {
-        const [x, y] = [east + side * right, north + side * up];
-        return [x, on(x, y, height) + RIBBON_LIFT_M, -y];
-      });
-    };
-    // Too narrow to mirror anything: seen flat, a stream would glitter.
-    const pieces = Math.ceil(length / most), tint = [...bytes(colorOf.cover(area, of) ?? colorOf.deck()), MADE];
-    for (let piece = 0; piece < pieces; piece++) {
-      const [left, other] = across(piece / pieces), [farLeft, farOther] = across((piece + 1) / pieces);
-      [left, other, farOther, left, farOther, farLeft].forEach((corner, i) => {
-        // South is z, and the first of a pair lies left of the line.
-        const side = [-1, 1, 1, -1, 1, -1][i];
-        positions.push(...corner);
-        tints.push(...tint);
-        asides.push(side * right, -side * up);
-      });
-    }
-  }
-  const geometry = geometryOf(new Float32Array(positions));
-  geometry.getAttribute("tint").array.set(tints);
-  geometry.setAttribute("aside", new BufferAttribute(new Float32Array(asides), 2));
-  geometry.computeVertexNormals();
-  geometry.computeBoundingSphere();
-  return { mesh: meshOf(geometry, looks.ribbons), counts };
+  const ribbons = new Ribbons(area), joints = joined(roads, halfOf);
+  const counts = roads.map((road, number) => {
+    const put = ribbons.of(road), before = ribbons.count, [{ plan, aside }] = plansOf(road, joints[number]);
+    for (const piece of piecesOf(road, plan, most)) put(piece.map(([x, y]) => [x, y, on(x, y)]), aside);
+    return ribbons.count - before;
+  });
+  return { mesh: ribbons.mesh(), counts };
 }
 
 /** The tint of a class that has a colour of its own. */
