@@ -57,7 +57,7 @@ impl Viewed {
         let Opened { contents, area } = Opened::open(folder)?;
         contents.files_of(area.whole())?;
         let waters = waters(&product.job);
-        let mut overview = Overview::read(&area, &waters).map_err(|error| damaged(&error))?;
+        let mut overview = Overview::read(&area).map_err(|error| damaged(&error))?;
         let level = product.features.as_ref().map(|(level, _)| level);
         let in_modules = level.is_some() && VERSION_WITH_LINES <= product.job.modules.format;
         let lines = (!in_modules).then(|| level.map(|level| Lines::of(level, area.frame())).unwrap_or_default());

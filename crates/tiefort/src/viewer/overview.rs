@@ -29,11 +29,11 @@ pub struct Overview {
 }
 
 impl Overview {
-    /// Reads every load module, row by row; ground of the classes `waters` is water.
+    /// Reads every load module, row by row.
     ///
     /// # Errors
     /// When one is damaged or missing.
-    pub fn read(area: &Area, waters: &[u8]) -> Result<Self, ReadError> {
+    pub fn read(area: &Area) -> Result<Self, ReadError> {
         let (rows, cols) = (area.frame().rows, area.frame().cols);
         let heights = |steps: &u64| (u64::from(rows) * steps + 1) * (u64::from(cols) * steps + 1);
         let steps = [4, 2].into_iter().find(|steps| heights(steps) <= HEIGHTS_MAX).unwrap_or(1) as u32;
@@ -47,15 +47,16 @@ impl Overview {
             figures: Vec::new(),
         };
         for row in 0..rows {
-            overview.add_row(area, row, waters)?;
+            overview.add_row(area, row)?;
         }
         Ok(overview)
     }
 
-    fn add_row(&mut self, area: &Area, row: u32, waters: &[u8]) -> Result<(), ReadError> {
+    fn add_row(&mut self, area: &Area, row: u32) -> Result<(), ReadError> {
         let frame = area.frame();
         let ground = area.load(Block { south: row, west: 0, north: row + 1, east: frame.cols })?;
-        self.lines.add(edges_of(&ground, waters));
+        // From afar water is what lies at the corners of the coarse grid: without its line a river would have gaps.
+        self.lines.add(edges_of(&ground, &[]));
         for module in ground.modules() {
             let module = module.module();
             self.add_figures(module);

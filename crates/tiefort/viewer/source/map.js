@@ -1,5 +1,5 @@
 // The small map: the whole area, the block that is loaded, the observer.
-import { colorOf } from "./colors.js";
+import { bytes, colorOf, isWater } from "./colors.js";
 import { isSea } from "./server.js";
 
 /** Draws on `canvas`; `go(east, north)` is called for clicks. */
@@ -12,7 +12,7 @@ export class SmallMap {
     canvas.height = Math.max(Math.round((size * area.rows) / longer), 40);
     this.pixels = canvas.width / (area.cols * area.side_m);
     // Painted when it is first drawn.
-    this.ground = null;
+    this.ground = this.water = null;
     canvas.addEventListener("click", (event) => {
       const [x, y] = [event.offsetX / this.pixels, event.offsetY / this.pixels];
       go(area.sides[0] + x, area.sides[3] - y);
@@ -49,11 +49,31 @@ export class SmallMap {
     ground.getContext("2d").putImageData(picture, 0, 0);
   }
 
+  /** Rivers and streams as wide as they are, but not thinner than a pixel: most are narrower than what the ground is
+   * painted of, which shows pieces of them. */
+  rivers() {
+    const { area, pixels } = this, drawn = document.createElement("canvas"), context = drawn.getContext("2d");
+    Object.assign(drawn, { width: this.canvas.width, height: this.canvas.height });
+    context.lineCap = "round";
+    const at = ([east, north]) => [(east - area.sides[0]) * pixels, (area.sides[3] - north) * pixels];
+    for (const { class: of, width, ends: [from, to] } of [...area.lines.values()].flat()) {
+      if (!isWater(area, of)) continue;
+      context.strokeStyle = `rgb(${bytes(colorOf.cover(area, of) ?? colorOf.sea(area)).join()})`;
+      context.lineWidth = Math.max(width * pixels, 1);
+      context.beginPath();
+      context.moveTo(...at(from));
+      context.lineTo(...at(to));
+      context.stroke();
+    }
+    return drawn;
+  }
+
   draw(block, tank, range) {
     if (!this.ground) this.repaint("height");
     const { area, canvas, pixels } = this, context = canvas.getContext("2d");
     context.imageSmoothingEnabled = !this.byModule;
     context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);
+    if (!this.byModule) context.drawImage((this.water ??= this.rivers()), 0, 0);
     const [x, y] = [(tank.east - area.sides[0]) * pixels, (area.sides[3] - tank.north) * pixels];
     if (block) {
       const [south, west, north, east] = block.map((line) => line * area.side_m * pixels);
