@@ -72,6 +72,9 @@ export function showLegend(area, colors, showsDem) {
     element.textContent = words;
     return element;
   }));
+  const sea = at("legend").querySelector("div");
+  sea.hidden = colors !== "height" || !area.hasSea;
+  sea.querySelector("b").style.background = area.palette.water;
 }
 
 /** What was clicked: a triangle of a load module, or a load module that is drawn coarsely. */

@@ -10,7 +10,7 @@ const QUANTA = 128;
 const SEA_M = 0.75, SEA_SHARE = 0.02;
 const isAtSeaLevel = (height) => Math.abs(height) < SEA_M;
 
-/** Whether ground at these heights is the sea. */
+/** Whether ground at these heights is taken for the sea; the legend says so. Pictures of `render` show its heights. */
 export const isSea = (area, heights) => area.hasSea && heights.every(isAtSeaLevel);
 
 /** What the server answers; fails with its words where it has none. */
