@@ -251,11 +251,13 @@ struct Looks<'a> {
     workers: Workers,
 }
 
-/// Places that were looked at, and those that are seen.
+/// Places that were looked at, and of the ground around them what was looked at and what is seen, in cells: at the
+/// border of the area a place stands for the part of its cell inside.
 #[derive(Default)]
 struct Count {
     places: u64,
-    seen: u64,
+    cells: f64,
+    seen: f64,
 }
 
 impl Looks<'_> {
@@ -271,9 +273,26 @@ impl Looks<'_> {
             found.lock().unwrap_or_else(PoisonError::into_inner)[piece] = looks;
         });
         let rows = found.into_inner().unwrap_or_else(PoisonError::into_inner).concat();
-        count.places += rows.iter().filter(|look| look.seen <= SEEN).count() as u64;
-        count.seen += rows.iter().filter(|look| look.seen == SEEN).count() as u64;
+        let side = self.viewshed.side() as usize;
+        for (at, look) in rows.iter().enumerate().filter(|(_, look)| look.seen <= SEEN) {
+            let cell = self.cell_inside([at % side, side - 1 - first - at / side]);
+            count.places += 1;
+            count.cells += cell;
+            count.seen += if look.seen == SEEN { cell } else { 0.0 };
+        }
         rows
+    }
+
+    /// The part inside the area of the cell around a place, columns from the west and rows from the south.
+    fn cell_inside(&self, number: [usize; 2]) -> f64 {
+        let (frame, step_m) = (self.ground.frame(), self.viewshed.spacing_m);
+        let counts = [frame.cols, frame.rows];
+        let part = |axis: usize| {
+            let middle = self.corner()[axis] + number[axis] as f64 * step_m - frame.origin_m[axis];
+            let end = f64::from(counts[axis]) * frame.side_m();
+            ((middle + step_m / 2.0).min(end) - (middle - step_m / 2.0).max(0.0)) / step_m
+        };
+        part(0).max(0.0) * part(1).max(0.0)
     }
 
     /// Whether there are woods, and they are looked at.
@@ -325,11 +344,13 @@ fn write_png(looks: &Looks, out: &Path) -> Result<Count, Failure> {
 
 fn told(looks: &Looks, count: &Count, out: &Path) -> String {
     let Viewshed { place_m: [east, north], eye_m, target_m, range_m, spacing_m, .. } = looks.viewshed;
-    let share = 100.0 * count.seen as f64 / (count.places as f64).max(1.0);
-    let area_km2 = count.seen as f64 * spacing_m * spacing_m / 1e6;
+    let km2 = |cells: f64| cells * spacing_m * spacing_m / 1e6;
+    let share = if 0.0 < count.cells { 100.0 * count.seen / count.cells } else { 0.0 };
     let text = format!(
-        "seen from {east},{north}, {eye_m} m above the ground: {share:.1} % of {} places {spacing_m} m apart within \
-         {} km, or {area_km2:.2} km2 of what stands {target_m} m above the ground; in {}",
+        "seen from {east},{north}, {eye_m} m above the ground: {share:.1} % of {:.2} km2, or {:.2} km2 of what stands \
+         {target_m} m above the ground, by {} places {spacing_m} m apart within {} km; in {}",
+        km2(count.cells),
+        km2(count.seen),
         grouped(count.places),
         range_m / 1000.0,
         out.display()

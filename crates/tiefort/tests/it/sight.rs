@@ -49,6 +49,26 @@ fn a_viewshed_is_what_lines_of_sight_say_place_by_place() {
     scene.run_to(0, &[&wanted[..], &["--curvature", "--out", "a.png"]].concat());
 }
 
+/// The numbers before ` km2` and ` %` in what a viewshed says.
+fn figures(said: &str) -> Vec<f64> {
+    let words: Vec<&str> = said.split_whitespace().collect();
+    let is_figure = |pair: &&[&str]| ["km2", "km2,", "%"].contains(&pair[1]);
+    words.windows(2).filter(is_figure).map(|pair| pair[0].parse().unwrap()).collect()
+}
+
+#[test]
+fn the_share_of_a_viewshed_and_its_area_agree_up_to_the_border() {
+    let scene = Scene::built();
+    // As far as every corner of the area of 4 x 4 km.
+    let wanted = ["sight", "small.tdb", "--from", EYE, "--range", "5", "--spacing", "50", "--out", "all.png"];
+    let said = scene.run_to(0, &wanted).stdout;
+    let [share, all_km2, seen_km2] = figures(&said)[..] else { panic!("{said}") };
+    let frame = ground(&scene).frame().clone();
+    let [wide, high] = [frame.cols, frame.rows].map(|count| f64::from(count) * frame.side_m() / 1000.0);
+    assert!((all_km2 - wide * high).abs() < 0.006, "{all_km2} of {wide} x {high} km: {said}");
+    assert!((seen_km2 - share / 100.0 * all_km2).abs() < 0.02, "{said}");
+}
+
 #[test]
 fn one_place_sees_another_or_is_told_what_hides_it() {
     let scene = Scene::built();
