@@ -1,5 +1,6 @@
 //! Class rasters: which class lies at a post, by the nearest sample.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use terrain::geometry::resample::{TAP_UNITS, nearest};
@@ -49,34 +50,57 @@ impl ClassRaster {
         Ok(Self { windows: Windows::new(vec![file], KEPT_BYTES), reach, warp })
     }
 
+    /// The number by which the file marks samples that are none.
+    pub fn nodata(&self) -> Option<f64> {
+        self.windows.files()[0].nodata()
+    }
+
     /// Which posts of `rect` are of class `value`, row-major from the south. Posts where the raster has no sample, or
     /// a void one, are of no class.
     ///
     /// # Errors
     /// When the file cannot be read any more.
     pub fn members(&self, grid: &GridFrame, rect: PostRect, value: i32) -> Result<Vec<bool>, SourceError> {
+        let value = Some(f64::from(value));
+        self.each(grid, rect, |class| class == value)
+    }
+
+    /// The classes that posts of `rect` are of, each once.
+    ///
+    /// # Errors
+    /// When the file cannot be read any more.
+    pub fn values(&self, grid: &GridFrame, rect: PostRect) -> Result<BTreeSet<i64>, SourceError> {
+        let mut classes = self.each(grid, rect, |class| class)?;
+        // Most posts are of the class of the one before.
+        classes.dedup();
+        // Opening has made sure that they are whole numbers.
+        Ok(classes.into_iter().flatten().map(|class| class as i64).collect())
+    }
+
+    /// What `of` makes of the class of each post of `rect`.
+    fn each<T: Clone>(
+        &self,
+        grid: &GridFrame,
+        rect: PostRect,
+        of: impl Fn(Option<f64>) -> T,
+    ) -> Result<Vec<T>, SourceError> {
         let frame = self.windows.files()[0].frame();
         if let Some(warp) = &self.warp {
-            let Some(raster) = self.read(warp.window(rect, 1))? else { return Ok(vec![false; rect.post_count()]) };
+            let Some(raster) = self.read(warp.window(rect, 1))? else { return Ok(vec![of(None); rect.post_count()]) };
             let places = warp.over(rect);
             let posts = (rect.south..=rect.north).flat_map(|row| (rect.west..=rect.east).map(move |col| (row, col)));
             let near = |units: i64| u32::try_from((units + i64::from(TAP_UNITS / 2)).div_euclid(TAP_UNITS.into())).ok();
-            return Ok(posts
-                .map(|(row, col)| {
-                    places.at(row, col).is_some_and(|[col, row]| is_of(&raster, near(row), near(col), value))
-                })
-                .collect());
+            let class = |[col, row]: [i64; 2]| class_at(&raster, near(row), near(col));
+            return Ok(posts.map(|(row, col)| of(places.at(row, col).and_then(class))).collect());
         }
         let Some(raster) = self.read(window_near(frame, grid, rect).ok())? else {
-            return Ok(vec![false; rect.post_count()]);
+            return Ok(vec![of(None); rect.post_count()]);
         };
         let cols: Vec<Option<u32>> =
             (rect.west..=rect.east).map(|col| nearest(col_of(frame, grid, col), frame.cols)).collect();
         let rows = (rect.south..=rect.north).map(|row| nearest(row_of(frame, grid, row), frame.rows));
-        Ok(rows
-            .flat_map(|row| cols.iter().map(move |&col| (row, col)))
-            .map(|(row, col)| is_of(&raster, row, col, value))
-            .collect())
+        let places = rows.flat_map(|row| cols.iter().map(move |&col| (row, col)));
+        Ok(places.map(|(row, col)| of(class_at(&raster, row, col))).collect())
     }
 
     fn read(&self, window: Option<PostRect>) -> Result<Option<Raster>, SourceError> {
@@ -85,10 +109,9 @@ impl ClassRaster {
     }
 }
 
-fn is_of(raster: &Raster, row: Option<u32>, col: Option<u32>, value: i32) -> bool {
-    let (Some(Ok(row)), Some(Ok(col))) = (row.map(i32::try_from), col.map(i32::try_from)) else { return false };
-    let post = Post::new(row, col);
-    raster.window().contains(post) && raster.sample(post) == Some(f64::from(value))
+fn class_at(raster: &Raster, row: Option<u32>, col: Option<u32>) -> Option<f64> {
+    let post = Post::new(i32::try_from(row?).ok()?, i32::try_from(col?).ok()?);
+    raster.window().contains(post).then(|| raster.sample(post)).flatten()
 }
 
 /// The posts of a raster that are nearest to posts of `area`.

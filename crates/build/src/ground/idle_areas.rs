@@ -35,9 +35,8 @@ pub fn idle_areas(
     let mut idle = Vec::new();
     for (index, spec) in areas.iter().enumerate() {
         let class = spec.class;
-        let is_shared = class == 0
-            || job.is_of_features(class)
-            || 1 < areas.iter().filter(|other| other.class == class).count();
+        let is_shared =
+            class == 0 || job.is_of_features(class) || 1 < areas.iter().filter(|other| other.class == class).count();
         if !is_shared && posts.get(usize::from(class)).is_some_and(|&count| 0 < count) {
             continue;
         }
@@ -124,9 +123,7 @@ impl Looked<'_> {
 fn extent_of(polygons: &[Polygon]) -> [f64; 4] {
     let nowhere = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     let places = polygons.iter().flat_map(|polygon| polygon.rings.iter().flatten());
-    places.fold(nowhere, |[west, south, east, north], &[x, y]| {
-        [west.min(x), south.min(y), east.max(x), north.max(y)]
-    })
+    places.fold(nowhere, |[west, south, east, north], &[x, y]| [west.min(x), south.min(y), east.max(x), north.max(y)])
 }
 
 /// Values that posts have, the least of them, and whether one is that of the job.

@@ -20,7 +20,8 @@ fn write_classes(folder: &Path) {
 /// A square of so many metres, so far east of the area's corner.
 fn write_square(path: &Path, [at, side]: [f64; 2]) {
     let corner = |east: f64, north: f64| format!("[{}, {}]", ORIGIN_M[0] + at + east, ORIGIN_M[1] + 210.0 + north);
-    let ring = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0)].map(|(east, north)| corner(east, north));
+    let ring =
+        [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side), (0.0, 0.0)].map(|(east, north)| corner(east, north));
     let crs = r#""crs":{"type":"name","properties":{"name":"EPSG:32611"}}"#;
     let ring = ring.join(",");
     fs::write(path, format!("{{\"type\":\"Polygon\",{crs},\"coordinates\":[[{ring}]]}}")).unwrap();
@@ -49,7 +50,8 @@ fn check(areas: &[&str], expected: &[&str]) {
 
 #[test]
 fn areas_of_importance_that_hold_no_post_are_told() {
-    let raster = |value: i64, class: &str| format!("{{ raster = \"c.asc\", value = {value}, class = \"{class}\", weight = 1 }}");
+    let raster =
+        |value: i64, class: &str| format!("{{ raster = \"c.asc\", value = {value}, class = \"{class}\", weight = 1 }}");
     let file = |name: &str, class: &str| format!("{{ file = \"{name}.geojson\", class = \"{class}\", weight = 1 }}");
     check(&[&raster(3, "a"), &file("here", "b"), &raster(4, "default"), &file("here", "a")], &[]);
     // Later areas lie over it, which is meant.
