@@ -24,7 +24,7 @@ export class SmallMap {
     const { area } = this, { wide, high, heights, classes } = area.coarse;
     const ground = (this.ground ??= document.createElement("canvas"));
     const byModule = (this.byModule = colors !== "height");
-    [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide - 1, high - 1];
+    [ground.width, ground.height] = byModule ? [area.cols, area.rows] : [wide, high];
     const picture = new ImageData(ground.width, ground.height);
     const covers = Array.from({ length: 256 }, (_, ofClass) => colorOf.cover(area, ofClass));
     for (let row = 0; row < ground.height; row++) {
@@ -37,7 +37,8 @@ export class SmallMap {
         } else {
           const place = row * wide + col, step = area.side_m / area.coarse_steps;
           // Light from the north-west.
-          const slope = (heights[place + 1] - heights[place] + heights[place] - heights[place + wide]) / step;
+          const beside = Math.min(row, high - 2) * wide + Math.min(col, wide - 2);
+          const slope = (heights[beside + 1] - heights[beside + wide]) / step;
           shade = Math.min(Math.max(0.9 + slope, 0.45), 1.25);
           color = covers[classes[place]]
             ?? (isSea(area, [heights[place]]) ? colorOf.sea(area) : colorOf.height(area, heights[place]));
@@ -49,8 +50,8 @@ export class SmallMap {
     ground.getContext("2d").putImageData(picture, 0, 0);
   }
 
-  /** Rivers and streams as wide as they are, but not thinner than a pixel: most are narrower than what the ground is
-   * painted of, which shows pieces of them. */
+  /** Rivers and streams as wide as they are, but rivers not thinner than two pixels and streams than one: most are
+   * narrower than what the ground is painted of, which shows pieces of them. */
   rivers() {
     const { area, pixels } = this, drawn = document.createElement("canvas"), context = drawn.getContext("2d");
     Object.assign(drawn, { width: this.canvas.width, height: this.canvas.height });
@@ -59,7 +60,7 @@ export class SmallMap {
     for (const { class: of, width, ends: [from, to] } of [...area.lines.values()].flat()) {
       if (!isWater(area, of)) continue;
       context.strokeStyle = `rgb(${bytes(colorOf.cover(area, of) ?? colorOf.sea(area)).join()})`;
-      context.lineWidth = Math.max(width * pixels, 1);
+      context.lineWidth = Math.max(width * pixels, area.classes[of] === "stream" ? 1 : 2);
       context.beginPath();
       context.moveTo(...at(from));
       context.lineTo(...at(to));
@@ -72,7 +73,9 @@ export class SmallMap {
     if (!this.ground) this.repaint("height");
     const { area, canvas, pixels } = this, context = canvas.getContext("2d");
     context.imageSmoothingEnabled = !this.byModule;
-    context.drawImage(this.ground, 0, 0, canvas.width, canvas.height);
+    // Heights are those of the middles of its pixels, the outermost on the border of the area.
+    const half = this.byModule ? 0 : (pixels * area.side_m) / area.coarse_steps / 2;
+    context.drawImage(this.ground, -half, -half, canvas.width + 2 * half, canvas.height + 2 * half);
     if (!this.byModule) context.drawImage((this.water ??= this.rivers()), 0, 0);
     const [x, y] = [(tank.east - area.sides[0]) * pixels, (area.sides[3] - tank.north) * pixels];
     if (block) {
