@@ -3,25 +3,28 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use terrain::plans::{Ring, difference, triangles};
-use terrain::{
-    Band, Draped, Flat, HOLE_CLASS, LineKind, LoadModule, ModuleId, QUANTA_PER_METRE, band_rings,
-};
+use terrain::{Band, Draped, Flat, HOLE_CLASS, LineKind, LoadModule, ModuleId, QUANTA_PER_METRE, band_rings};
 
 use super::scene::{Scene, SceneFeatures};
 
 /// How far a band lies above the ground, in metres.
 const UP_M: f64 = 0.05;
+/// Metres up to which there are bands: farther away the widest are hardly wider than their lines.
+const REACH_M: f64 = 6_000.0;
 
 /// A triangle of a band in metres from the area's south-west post, and its place among the colours of features.
 type Piece = ([[f64; 3]; 3], u8);
 /// Rings by kind and class: what comes first covers the others.
 type Rings = BTreeMap<(LineKind, u8), Vec<Ring>>;
 
-/// The bands of a scene, draped over the ground of its load modules; strips, which have triangles, cover them.
-pub(crate) fn bands_of(scene: &Scene, features: &SceneFeatures) -> Vec<Piece> {
+/// The bands of a scene around a place, in metres from the area's south-west post, draped over the ground of its load
+/// modules; strips, which have triangles, cover them.
+pub(crate) fn bands_of(scene: &Scene, features: &SceneFeatures, place_m: [f64; 2]) -> Vec<Piece> {
     let frame = Frame::of(scene);
+    let modules: Vec<&LoadModule> =
+        scene.modules.iter().filter(|module| away_m(module.id, scene.side_m(), place_m) < REACH_M).collect();
     let lines =
-        || scene.modules.iter().flat_map(|module| module.lines.iter().map(move |line| (line, frame.corner(module.id))));
+        || modules.iter().flat_map(|module| module.lines.iter().map(move |line| (line, frame.corner(module.id))));
     let bands: Vec<Band> = lines().filter_map(|(line, corner)| Band::of(line, corner)).collect();
     let taken: BTreeSet<u8> = lines().map(|(line, _)| line.class).chain([HOLE_CLASS]).collect();
     let mut by_module: BTreeMap<ModuleId, Rings> = BTreeMap::new();
@@ -32,11 +35,21 @@ pub(crate) fn bands_of(scene: &Scene, features: &SceneFeatures) -> Vec<Piece> {
             }
         }
     }
-    let of_module = |module: &LoadModule| {
+    let of_module = |module: &&LoadModule| {
         let rings = by_module.get(&module.id)?;
         Some(frame.pieces(module, rings, &taken, features))
     };
-    scene.modules.iter().filter_map(of_module).flatten().collect()
+    modules.iter().filter_map(of_module).flatten().collect()
+}
+
+/// How far a load module lies from a place, in metres.
+fn away_m(id: ModuleId, side_m: f64, place_m: [f64; 2]) -> f64 {
+    let beside = |axis: usize, number: u32| {
+        let low = f64::from(number) * side_m;
+        (low - place_m[axis]).max(place_m[axis] - low - side_m).max(0.0)
+    };
+    let (east, north) = (beside(0, id.col), beside(1, id.row));
+    (east * east + north * north).sqrt()
 }
 
 /// Where load modules lie: places are quanta from the south-west corner of the part that is looked at.
@@ -78,13 +91,7 @@ impl Frame {
     }
 
     /// The triangles of the bands over a load module.
-    fn pieces(
-        &self,
-        module: &LoadModule,
-        rings: &Rings,
-        taken: &BTreeSet<u8>,
-        features: &SceneFeatures,
-    ) -> Vec<Piece> {
+    fn pieces(&self, module: &LoadModule, rings: &Rings, taken: &BTreeSet<u8>, features: &SceneFeatures) -> Vec<Piece> {
         let ground = Draped::of(module, self.corner(module.id)).without(module, taken);
         let first = [self.south_west.col, self.south_west.row].map(|at| f64::from(at) * f64::from(self.side));
         let metre = f64::from(QUANTA_PER_METRE);
@@ -144,11 +151,12 @@ mod tests {
         let names = ["plain", "primary"].map(str::to_owned);
         let features = SceneFeatures { names: &names, classes: &[1], lines: &[], remarks: &[] };
         let scene = samples::scene(&modules, &limits);
-        let pieces = bands_of(&scene, &features);
+        let pieces = bands_of(&scene, &features, [250.0, 250.0]);
         let doubled = |[a, b, c]: [[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         let area: f64 = pieces.iter().map(|(at, _)| doubled(*at) / 2.0).sum();
         // Two load modules of 500 m; half a disc at the far end, and none where both meet or the area ends.
         assert!((10_000.0..10_040.0).contains(&area), "{area} m2");
+        assert!(bands_of(&scene, &features, [250.0, -REACH_M - 1.0]).is_empty());
         for [x, y, z] in pieces.iter().flat_map(|(at, _)| at) {
             assert!((244.9..255.1).contains(y), "{y}");
             assert!((z - UP_M - (500.0 + x / 10.0 - y / 20.0)).abs() < 0.02, "{x} {y} {z}");

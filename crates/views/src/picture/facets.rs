@@ -77,9 +77,9 @@ impl Facets {
         Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_covers_of(scene, scene.modules)
     }
 
-    /// The facets of a scene with the bands of its ways, for an observer who is near them.
-    pub(crate) fn with_bands_of(self, scene: &Scene) -> Self {
-        let bands = scene.features.map(|features| bands_of(scene, &features)).unwrap_or_default();
+    /// The facets of a scene with the bands of its ways around a place, in metres from the area's south-west post.
+    pub(crate) fn with_bands_of(self, scene: &Scene, place_m: [f64; 2]) -> Self {
+        let bands = scene.features.map(|features| bands_of(scene, &features, place_m)).unwrap_or_default();
         Self { bands, ..self }
     }
 

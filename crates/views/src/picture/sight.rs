@@ -48,7 +48,9 @@ const PITCH: f64 = -2.0;
 /// # Panics
 /// When the ground is asked for and the scene has none.
 pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide: usize) -> Image {
-    let facets = Facets::of_scene(scene).with_bands_of(scene);
+    let facets = Facets::of_scene(scene);
+    let place_m = place_m(scene, facets.extent_m, sight);
+    let facets = facets.with_bands_of(scene, place_m);
     let covers = scene.ground.map(|ground| facets.post_covers(ground.dem, scene.frame.spacing.metres()));
     let triangles = Surface::Triangles(&facets);
     let tin = || Panel { label: format!("TIN, {}", scene.triangles_in_words()), surface: triangles };
@@ -71,6 +73,13 @@ pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide
     draw_panels(&title, &eye_text(scene, sight, &camera), &panels, style, &look)
 }
 
+/// Where an observer stands, or else what he overlooks, in metres from the area's south-west post.
+fn place_m(scene: &Scene, [west, south, east, north]: [f64; 4], sight: &Sight) -> [f64; 2] {
+    let origin = [scene.frame.origin_east_m, scene.frame.origin_north_m];
+    let of_eye = |eye: Eye| [0, 1].map(|axis| eye.place_m[axis] - origin[axis]);
+    sight.eye.map_or([f64::midpoint(west, east), f64::midpoint(south, north)], of_eye)
+}
+
 fn camera(scene: &Scene, facets: &Facets, sight: &Sight, range_m: (f64, f64)) -> Camera {
     let extent = facets.extent_m;
     let Some(eye) = sight.eye else {
@@ -78,7 +87,7 @@ fn camera(scene: &Scene, facets: &Facets, sight: &Sight, range_m: (f64, f64)) ->
         let over = Camera::overlooking(extent, range_m, sight.times, direction, wide.unwrap_or(FIELD_OF_VIEW.1));
         return Camera { pitch_degrees: sight.pitch_degrees.unwrap_or(over.pitch_degrees), ..over };
     };
-    let [east, north] = [eye.place_m[0] - scene.frame.origin_east_m, eye.place_m[1] - scene.frame.origin_north_m];
+    let [east, north] = place_m(scene, extent, sight);
     let inside = [east.clamp(extent[0], extent[2]), north.clamp(extent[1], extent[3])];
     let ground_m = ground_m(scene, facets, inside) * sight.times;
     let to_middle = [0.5 * (extent[0] + extent[2]) - east, 0.5 * (extent[1] + extent[3]) - north];
