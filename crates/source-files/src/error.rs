@@ -197,6 +197,9 @@ pub enum SourceError {
         expected OpenStreetMap (.osm.pbf), a GeoPackage, a Shapefile, GeoJSON or GeoParquet"
     )]
     NotFeatures { path: PathBuf, found: String },
+    /// A GeoParquet file is packed in a way that is not read.
+    #[error("{path}: its pages are packed with {found}, which is not read; expected zstd, snappy, gzip or none")]
+    Packing { path: PathBuf, found: &'static str },
     /// The system of the file's coordinates cannot be computed, and nothing else says what it is.
     #[error("{path}: the coordinate reference system is {found}, expected one that can be computed")]
     FeatureCrs { path: PathBuf, found: String },
@@ -269,6 +272,7 @@ impl SourceError {
             Layer { .. } => "name a layer: sources = [{ file = \"…\", layer = \"…\" }]; ogrinfo lists them",
             FeatureCrs { .. } => "say what it is: features.sources = [{ file = \"…\", crs = \"EPSG:…\" }]",
             NoOtherCrs { .. } => "remove crs",
+            Packing { .. } => "pack it anew: ogr2ogr -lco COMPRESSION=ZSTD out.parquet in.parquet",
             OtherFormat { found, .. } if has(found, &["features"]) => {
                 "name a raster here; files of lines and polygons go into features.sources"
             }

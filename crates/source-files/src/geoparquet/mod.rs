@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use geojson::JsonValue;
+use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::page_index::RowGroupPageIndex;
 use parquet::file::metadata::{
@@ -180,11 +181,10 @@ impl GeoParquet {
             Pages::open(&self.path, self.len).map_err(|source| SourceError::Open { path: self.path.clone(), source });
         let (pages, properties) = (Arc::new(pages?), Arc::new(ReaderProperties::builder().build()));
         for &number in groups {
-            let failed = |error: ParquetError| {
-                let expected = "a sound one, packed with zstd, snappy or gzip";
-                broken(&self.path, format!("row group {number}: {error}"), expected)
-            };
+            let failed =
+                |error: ParquetError| broken(&self.path, format!("row group {number}: {error}"), "a sound one");
             let group = self.metadata.row_group(number);
+            self.check_packing(group, columns)?;
             let index = RowGroupPageIndex::new(number, None);
             let reader = SerializedRowGroupReader::new(pages.clone(), group, index, properties.clone());
             let reader = reader.map_err(failed)?;
@@ -194,6 +194,21 @@ impl GeoParquet {
             }
         }
         Ok(())
+    }
+
+    /// Refuses pages of columns that are to be read and are packed in a way that is not.
+    fn check_packing(&self, group: &RowGroupMetaData, columns: &Type) -> Result<(), SourceError> {
+        let is_wanted = |column: &&ColumnChunkMetaData| {
+            let name = column.column_path().parts().first();
+            columns.get_fields().iter().any(|field| name.is_some_and(|name| name == field.name()))
+        };
+        let refused = group.columns().iter().filter(is_wanted).find_map(|column| match column.compression() {
+            Compression::BROTLI(_) => Some("brotli"),
+            Compression::LZ4 | Compression::LZ4_RAW => Some("lz4"),
+            Compression::LZO => Some("lzo"),
+            Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::GZIP(_) | Compression::ZSTD(_) => None,
+        });
+        refused.map_or(Ok(()), |found| Err(SourceError::Packing { path: self.path.clone(), found }))
     }
 
     /// Ranges of bytes of some row groups, in their order.
