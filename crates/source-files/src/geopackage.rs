@@ -35,6 +35,15 @@ pub(crate) struct Table {
     pub srs: i64,
 }
 
+/// A column of a table of features.
+pub(crate) struct Column {
+    /// Its place in a row.
+    pub place: usize,
+    pub name: String,
+    /// The type that the table declares, in capitals: what is in it may be of any.
+    pub declared: String,
+}
+
 /// An open GeoPackage.
 pub(crate) struct Package<'a> {
     path: &'a Path,
@@ -143,10 +152,10 @@ impl<'a> Package<'a> {
         })
     }
 
-    /// The names of all columns of a layer, but for that of its number, with the place of each in a row.
+    /// All columns of a layer, but for that of its number.
     ///
     /// The library's own list panics where a name is not UTF-8.
-    pub(crate) fn columns(&self, table: &Table) -> Result<Vec<(usize, String)>, SourceError> {
+    pub(crate) fn columns(&self, table: &Table) -> Result<Vec<Column>, SourceError> {
         let query = "SELECT name, type, pk FROM pragma_table_xinfo(?1) ORDER BY cid";
         let mut statement = self.database.prepare(query).map_err(|error| self.broken(error))?;
         let mut rows = statement.query([&table.name]).map_err(|error| self.broken(error))?;
@@ -157,8 +166,9 @@ impl<'a> Package<'a> {
                 Ok(_) => Ok(String::new()),
                 Err(error) => Err(self.broken(error)),
             };
-            let is_number = text(1)?.eq_ignore_ascii_case("INTEGER") && row.get(2).is_ok_and(|key: i64| key == 1);
-            columns.extend((!is_number).then_some((place, text(0)?)));
+            let (name, declared) = (text(0)?, text(1)?.to_ascii_uppercase());
+            let is_number = declared == "INTEGER" && row.get(2).is_ok_and(|key: i64| key == 1);
+            columns.extend((!is_number).then_some(Column { place, name, declared }));
             place += 1;
         }
         Ok(columns)

@@ -1,6 +1,7 @@
 //! Lines and polygons from GeoParquet, row group by row group, with its columns as tags; those of Overture as the tags
 //! of OpenStreetMap that they stand for.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use parquet::basic::{ConvertedType, Repetition, Type as Physical};
@@ -9,11 +10,14 @@ use parquet::schema::types::Type;
 
 use super::columns::{Texts, with_packed_tags};
 use super::model::{FeatureFile, Wanted, file_name};
+use super::moments::{Clock, day_text};
 use super::overture::{self, Holds, Rule};
-use super::placing::{LEFT_OUT, Placing};
+use super::placing::{LEFT_OUT, Placing, look_like_degrees};
 use super::raw::{Part, RawFeature, RawShape};
+use super::value::Value;
 use super::well_known::binary;
 use crate::SourceError;
+use crate::crs::Crs;
 use crate::geoparquet::GeoParquet;
 use crate::store::Store;
 
@@ -49,21 +53,27 @@ fn near(file: &GeoParquet, placing: &Placing) -> (Vec<usize>, Vec<usize>) {
 
 pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
     let file = footer(store)?;
-    let mut placing = Placing::new(store.path(), store.file_bytes(), wanted, wanted.system(|| file.system())?)?;
+    let is_overture = is_overture(file.schema());
+    let columns =
+        projection(&file, is_overture).map_err(|found| store.malformed("the table", found, "a column of binary"))?;
+    let said = wanted.system(|| match file.system()? {
+        Some(crs) => Ok(Some(crs)),
+        None => Ok(looks(&file, &columns)?.then(Crs::wgs84)),
+    })?;
+    let mut placing = Placing::new(store.path(), store.file_bytes(), wanted, said)?;
     let (groups, others) = near(&file, &placing);
     for group in others {
         placing.count_outside(file.rows_of(group));
         file.extent(group).iter().for_each(|extent| placing.lies_over(extent));
     }
-    let is_overture = is_overture(file.schema());
-    let columns =
-        projection(&file, is_overture).map_err(|found| store.malformed("the table", found, "a column of binary"))?;
     let has = |name: &str| columns.get_fields().iter().any(|field| field.name() == name);
     let holds = is_overture.then(|| Holds::of(has));
     let (name, mut texts, mut before) = (file_name(store), Texts::default(), 0_u64);
+    let clocks: Clocks =
+        columns.get_fields().iter().filter_map(|field| Some((field.name().to_owned(), Clock::of(field)?))).collect();
     file.rows(&groups, &columns, &mut |_, row| {
         before += 1;
-        let row = Columns::of(row, file.column());
+        let row = Columns::of(row, file.column(), &clocks);
         let id = match row.text("id").filter(|id| is_overture && !id.is_empty()) {
             Some(id) => id.to_owned(),
             None => format!("{name}#{}", before - 1),
@@ -81,6 +91,26 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         placing.allowance().check()
     })?;
     placing.finish(attribution(&file))
+}
+
+/// Whether the first places of a file that names no system look like degrees.
+fn looks(file: &GeoParquet, columns: &Type) -> Result<bool, SourceError> {
+    const LOOKED_AT: usize = 1000;
+    let is_geometry = |field: &&Arc<Type>| field.name() == file.column();
+    let geometry: Vec<Arc<Type>> = columns.get_fields().iter().filter(is_geometry).cloned().collect();
+    let geometry = Type::group_type_builder(file.schema().name()).with_fields(geometry).build();
+    let geometry = geometry.expect("a part of the columns that are read is sound");
+    let (mut vertices, first) = (Vec::new(), usize::from(0 < file.group_count()));
+    let groups: Vec<usize> = (0..first).collect();
+    file.rows(&groups, &geometry, &mut |_, row| {
+        if vertices.len() < LOOKED_AT
+            && let Some(bytes) = Columns::of(row, file.column(), &Clocks::new()).geometry
+        {
+            vertices.extend(binary(&bytes).iter().flat_map(|shape| shape.vertices()).take(LOOKED_AT).copied());
+        }
+        Ok(())
+    })?;
+    Ok(look_like_degrees(vertices.iter()))
 }
 
 /// Places a feature, a segment of Overture in the parts along which its rules hold.
@@ -149,7 +179,7 @@ fn projection(file: &GeoParquet, is_overture: bool) -> Result<Type, String> {
     if !is_binary {
         return Err(format!("no column `{}` of binary", file.column()));
     }
-    Type::group_type_builder("schema").with_fields(fields).build().map_err(|error| error.to_string())
+    Type::group_type_builder(file.schema().name()).with_fields(fields).build().map_err(|error| error.to_string())
 }
 
 /// Whether a column holds one value of a kind that becomes a text.
@@ -163,6 +193,8 @@ fn is_value(field: &Type) -> bool {
             (field.get_physical_type(), info.converted_type()),
             (Physical::BOOLEAN | Physical::FLOAT | Physical::DOUBLE, C::NONE)
                 | (Physical::BYTE_ARRAY, C::UTF8 | C::ENUM)
+                | (Physical::INT32, C::DATE)
+                | (Physical::INT64, C::TIMESTAMP_MILLIS | C::TIMESTAMP_MICROS)
                 | (Physical::INT32, C::NONE | C::INT_8 | C::INT_16 | C::INT_32 | C::UINT_8 | C::UINT_16 | C::UINT_32)
                 | (Physical::INT64, C::NONE | C::INT_64 | C::UINT_64)
         )
@@ -189,6 +221,9 @@ fn is_read(field: &Type, depth: usize) -> bool {
         }
 }
 
+/// How columns of moments count, by their names.
+type Clocks = BTreeMap<String, Clock>;
+
 /// A row, taken apart.
 struct Columns {
     geometry: Option<Vec<u8>>,
@@ -197,11 +232,14 @@ struct Columns {
 }
 
 impl Columns {
-    fn of(row: Row, geometry: &str) -> Self {
+    fn of(row: Row, geometry: &str, clocks: &Clocks) -> Self {
         let mut own = Self { geometry: None, said: Vec::new(), rules: Vec::new() };
         for (name, field) in row.into_columns() {
             match field {
                 Field::Bytes(bytes) if name == geometry => own.geometry = Some(bytes.data().to_vec()),
+                field if clocks.contains_key(&name) => {
+                    own.said.extend(clocks[&name].text(&field).map(|text| (name, text)));
+                }
                 field => match (text_of(&field), overture::RULES.iter().find(|(rules, _)| *rules == name)) {
                     (Some(text), _) => own.said.push((name, text)),
                     (None, Some((column, _))) => own.rules.extend(rules_of(column, &field)),
@@ -222,23 +260,25 @@ impl Columns {
 
 const SUBCLASSES: &str = "subclass_rules";
 
-/// A value as a tag's: texts as they are, numbers and booleans as written.
+/// A value as a tag's.
 fn text_of(field: &Field) -> Option<String> {
-    Some(match field {
-        Field::Str(text) => text.clone(),
-        Field::Bool(value) => value.to_string(),
-        Field::Byte(number) => number.to_string(),
-        Field::Short(number) => number.to_string(),
-        Field::Int(number) => number.to_string(),
-        Field::Long(number) => number.to_string(),
-        Field::UByte(number) => number.to_string(),
-        Field::UShort(number) => number.to_string(),
-        Field::UInt(number) => number.to_string(),
-        Field::ULong(number) => number.to_string(),
-        Field::Float(number) => number.to_string(),
-        Field::Double(number) => number.to_string(),
+    let value = match *field {
+        Field::Str(ref text) => Value::Text(text.clone()),
+        Field::Bool(value) => Value::Truth(value),
+        Field::Byte(number) => Value::Whole(number.into()),
+        Field::Short(number) => Value::Whole(number.into()),
+        Field::Int(number) => Value::Whole(number.into()),
+        Field::Long(number) => Value::Whole(number),
+        Field::UByte(number) => Value::Count(number.into()),
+        Field::UShort(number) => Value::Count(number.into()),
+        Field::UInt(number) => Value::Count(number.into()),
+        Field::ULong(number) => Value::Count(number),
+        Field::Float(number) => Value::single(number),
+        Field::Double(number) => Value::Number(number),
+        Field::Date(days) => return day_text(days),
         _ => return None,
-    })
+    };
+    value.text()
 }
 
 /// The rules in a column of them: each has a value or a list of values, and mostly two numbers between which it holds.

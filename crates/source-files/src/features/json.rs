@@ -8,6 +8,7 @@ use super::model::{FeatureFile, Wanted, file_name};
 use super::placing::{Placing, look_like_degrees};
 use super::raw::RawFeature;
 use super::strict::{self, said_by, said_in, shape_of};
+use super::value::Value;
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::store::Store;
@@ -48,15 +49,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     }
     let all = raw.iter().flat_map(|feature| feature.shape.vertices());
     let said = said.or_else(|| look_like_degrees(all).then(Crs::wgs84));
-    let is_assumed = said.is_none() && raw.iter().any(|feature| feature.shape.vertices().next().is_some());
     let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
-    if is_assumed {
-        placing.note(format!(
-            "it names no coordinate system and its numbers are no degrees: they are taken for metres of EPSG:{}; \
-             crs names another",
-            wanted.epsg
-        ));
-    }
     for (id, found) in faults {
         placing.count_left_out();
         placing.leave_out(&id, found);
@@ -66,11 +59,19 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     placing.finish(None)
 }
 
-/// A property as a tag's value: texts as they are, numbers and booleans as written.
+/// A property as a tag's value; lists and objects as they are written.
 fn text_of(value: JsonValue) -> Option<String> {
-    match value {
-        JsonValue::Null => None,
-        JsonValue::String(text) => Some(text),
-        other => Some(other.to_string()),
-    }
+    let value = match value {
+        JsonValue::Null => return None,
+        JsonValue::String(text) => Value::Text(text),
+        JsonValue::Bool(value) => Value::Truth(value),
+        JsonValue::Number(number) => match (number.as_i64(), number.as_u64(), number.as_f64()) {
+            (Some(whole), ..) => Value::Whole(whole),
+            (_, Some(count), _) => Value::Count(count),
+            (.., Some(number)) => Value::Number(number),
+            _ => Value::Text(number.to_string()),
+        },
+        other => Value::Text(other.to_string()),
+    };
+    value.text()
 }

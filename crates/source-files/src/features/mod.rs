@@ -14,6 +14,8 @@ mod formats;
 mod json;
 mod loose;
 mod model;
+#[cfg(feature = "geoparquet")]
+mod moments;
 mod nest;
 pub(crate) mod osm;
 #[cfg(feature = "geoparquet")]
@@ -23,6 +25,7 @@ mod placing;
 pub(crate) mod raw;
 mod shapes;
 pub(crate) mod strict;
+mod value;
 pub(crate) mod well_known;
 
 pub use clip::Extent;

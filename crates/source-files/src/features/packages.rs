@@ -10,10 +10,11 @@ use super::columns::{Texts, with_packed_tags};
 use super::model::{FeatureFile, Wanted};
 use super::placing::{LEFT_OUT, Placing, look_like_degrees};
 use super::raw::RawFeature;
+use super::value::Value;
 use super::well_known::geometry;
 use crate::SourceError;
 use crate::crs::Crs;
-use crate::geopackage::{Package, Table};
+use crate::geopackage::{Column, Package, Table};
 
 /// Features whose places say whether a layer without a system is in degrees.
 const LOOKED_AT: usize = 1000;
@@ -63,31 +64,39 @@ pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceEr
 /// Columns of a layer and where they stand in a row.
 struct Columns {
     geometry: usize,
-    others: Vec<(usize, String)>,
+    others: Vec<Column>,
 }
 
 impl Columns {
     fn of(path: &Path, package: &Package, table: &Table) -> Result<Self, SourceError> {
         let mut others = package.columns(table)?;
-        let Some(index) = others.iter().position(|(_, name)| name.eq_ignore_ascii_case(&table.column)) else {
+        let Some(index) = others.iter().position(|other| other.name.eq_ignore_ascii_case(&table.column)) else {
             let (what, found) = ("the GeoPackage".into(), format!("no column `{}` in `{}`", table.column, table.name));
             let expected = "the column of geometries that it lists".into();
             return Err(SourceError::Malformed { path: path.into(), what, found, expected });
         };
-        Ok(Self { geometry: others.remove(index).0, others })
+        Ok(Self { geometry: others.remove(index).place, others })
     }
 
     /// The columns of a row that hold something, as texts.
     fn said(&self, row: &Row) -> rusqlite::Result<Vec<(&str, String)>> {
         let mut said = Vec::new();
-        for (index, name) in &self.others {
-            let text = match row.get_ref(1 + index)? {
-                ValueRef::Integer(number) => number.to_string(),
-                ValueRef::Real(number) => number.to_string(),
-                ValueRef::Text(text) => String::from_utf8_lossy(text).into_owned(),
-                ValueRef::Null | ValueRef::Blob(_) => continue,
+        for Column { place, name, declared } in &self.others {
+            let value = match (row.get_ref(1 + place)?, declared.as_str()) {
+                (ValueRef::Integer(number @ (0 | 1)), "BOOLEAN") => Value::Truth(number == 1),
+                (ValueRef::Integer(number), _) => Value::Whole(number),
+                (ValueRef::Real(number), _) => Value::Number(number),
+                (ValueRef::Text(text), declared) => {
+                    let text = String::from_utf8_lossy(text).into_owned();
+                    match declared {
+                        "DATE" => Value::Day(text),
+                        "DATETIME" => Value::Moment(text),
+                        _ => Value::Text(text),
+                    }
+                }
+                (ValueRef::Null | ValueRef::Blob(_), _) => continue,
             };
-            said.push((name.as_str(), text));
+            said.extend(value.text().map(|text| (name.as_str(), text)));
         }
         Ok(said)
     }

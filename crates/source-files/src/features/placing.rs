@@ -26,6 +26,8 @@ pub(super) struct Placing {
     bounds: Extent,
     /// The file's system.
     source: Crs,
+    /// Whether that is the area's because the file names none.
+    is_assumed: bool,
     is_same: bool,
     /// What of the file's coordinates is projected at all.
     near: Extent,
@@ -49,6 +51,7 @@ impl Placing {
     pub(super) fn new(path: &Path, file_bytes: u64, wanted: &Wanted, said: Option<Crs>) -> Result<Self, SourceError> {
         let refused = |found: String| SourceError::PolygonCrs { path: path.into(), found, expected: wanted.epsg };
         let area = Crs::from_epsg(wanted.epsg).map_err(refused)?;
+        let is_assumed = said.is_none();
         let source = said.unwrap_or_else(|| area.clone());
         let is_same = source == area;
         let near = if is_same { wanted.bounds } else { seen_in(&area, &source, &wanted.bounds) };
@@ -59,6 +62,7 @@ impl Placing {
             area,
             bounds: wanted.bounds,
             source,
+            is_assumed,
             is_same,
             near,
             lies: Extent::NOTHING,
@@ -403,6 +407,12 @@ impl Placing {
     /// When that takes more than the file may.
     pub(super) fn finish(mut self, attribution: Option<&'static str>) -> Result<FeatureFile, SourceError> {
         self.allowance.check()?;
+        if self.is_assumed && 0 < self.file.found {
+            let (names_none, metres) = ("it names no coordinate system", format!("metres of {}", self.area.name()));
+            let note =
+                format!("{names_none} and its numbers are no degrees: they are taken for {metres}; crs names another");
+            self.file.notes.insert(0, note);
+        }
         if 0 < self.remarks_beyond {
             self.file.notes.push(format!("{} more remarks about single features", self.remarks_beyond));
         }
@@ -446,16 +456,6 @@ impl Placing {
 pub(super) const LEFT_OUT: Done = Done::LeftOut("left out");
 /// Metres, or feet, that no coordinate on the Earth exceeds in any system.
 const PLACE_MAX: f64 = 4.0e8;
-
-impl Part {
-    fn turn(&mut self, by: f64) {
-        match self {
-            Part::Point(vertex) => vertex[0] += by,
-            Part::Line(line) => line.iter_mut().for_each(|vertex| vertex[0] += by),
-            Part::Polygon(rings) => rings.iter_mut().flatten().for_each(|vertex| vertex[0] += by),
-        }
-    }
-}
 
 fn counted(vertices: usize) -> String {
     format!("{vertices} {}", if vertices == 1 { "vertex" } else { "vertices" })

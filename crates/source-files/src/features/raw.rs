@@ -39,6 +39,15 @@ impl Part {
         };
         single.into_iter().chain(rings.iter().map(Vec::as_slice))
     }
+
+    /// Moves it east by so much.
+    pub(super) fn turn(&mut self, by: f64) {
+        match self {
+            Part::Point(vertex) => vertex[0] += by,
+            Part::Line(line) => line.iter_mut().for_each(|vertex| vertex[0] += by),
+            Part::Polygon(rings) => rings.iter_mut().flatten().for_each(|vertex| vertex[0] += by),
+        }
+    }
 }
 
 impl RawShape {

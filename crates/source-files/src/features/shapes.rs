@@ -25,6 +25,12 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     if table.is_none() {
         placing.note("no table (.dbf) beside it, so its features have no attributes".into());
     }
+    if let Some(unread) = table.as_ref().and_then(|table| table.unread.as_ref()) {
+        placing.note(format!(
+            "{unread}, which is not read: its texts beyond ASCII are taken for Windows-1252, so names may be wrong; \
+             write it anew in UTF-8: ogr2ogr -lco ENCODING=UTF-8 out.shp in.shp"
+        ));
+    }
     let (name, mut texts) = (file_name(store), Texts::default());
     for (number, shape) in shapefile::shapes(store, &bytes, index.as_deref())?.enumerate() {
         let id = format!("{name}#{number}");

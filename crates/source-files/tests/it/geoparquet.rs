@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use parquet::basic::Compression;
-use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, FloatType, Int32Type, Int64Type};
 use parquet::file::metadata::{KeyValue, ParquetMetaDataReader, ParquetMetaDataWriter};
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
@@ -239,7 +239,7 @@ fn what_is_no_geoparquet_is_refused_with_a_word() {
             file(&[&[BRIDGE]], Some(&GEO.replace("\"geometry\"", "\"version\"")), Compression::SNAPPY),
             "`version` of binary",
         ),
-        (with_other_packing(&good), "row group 0"),
+        (with_other_packing(&good), "its pages are packed with lz4, which is not read"),
     ] {
         let error = read(&bytes).unwrap_err().to_string();
         assert!(error.contains(told) && error.contains("a.parquet"), "{told}: {error}");
@@ -260,4 +260,48 @@ fn no_cut_and_no_flipped_byte_is_ever_a_panic() {
             let _ = read(&bytes);
         }
     }
+}
+
+/// A file of one line in metres, in a system that is not said, with columns of days and moments.
+fn dated(day: i32, moment: i64) -> Vec<u8> {
+    let schema = "message m { required binary geometry; required int32 day (DATE); required int64 at \
+                  (TIMESTAMP(NANOS,false)); required int64 seen (TIMESTAMP(MILLIS,true)); required double lanes; }";
+    let geo = r#"{"primary_column":"geometry","columns":{"geometry":{"encoding":"WKB","crs":null}}}"#;
+    let geo = Some(vec![KeyValue::new("geo".into(), geo.to_owned())]);
+    let properties = WriterProperties::builder().set_key_value_metadata(geo).build();
+    let mut bytes = Vec::new();
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    let mut writer = SerializedFileWriter::new(&mut bytes, schema, Arc::new(properties)).unwrap();
+    let mut out = writer.next_row_group().unwrap();
+    let mut column = out.next_column().unwrap().unwrap();
+    column.typed::<ByteArrayType>().write_batch(&[line([500_000.0, 3.87e6]).into()], None, None).unwrap();
+    column.close().unwrap();
+    let mut column = out.next_column().unwrap().unwrap();
+    column.typed::<Int32Type>().write_batch(&[day], None, None).unwrap();
+    column.close().unwrap();
+    for count in [moment.saturating_mul(1_000_000), moment] {
+        let mut column = out.next_column().unwrap().unwrap();
+        column.typed::<Int64Type>().write_batch(&[count], None, None).unwrap();
+        column.close().unwrap();
+    }
+    let mut column = out.next_column().unwrap().unwrap();
+    column.typed::<DoubleType>().write_batch(&[3.0], None, None).unwrap();
+    column.close().unwrap();
+    out.close().unwrap();
+    writer.close().unwrap();
+    bytes
+}
+
+#[test]
+fn days_and_moments_are_texts_and_metres_of_no_system_are_told() {
+    // The last of January 2020, at half past twelve.
+    let file = read(&dated(18_292, 1_580_473_800_250)).unwrap();
+    let expected = "a.parquet#0 at=2020-01-31T12:30:00.25 day=2020-01-31 lanes=3 seen=2020-01-31T12:30:00.25Z 2";
+    assert_eq!(told(&file), [expected]);
+    assert!(file.notes[0].contains("taken for metres of EPSG:32611"), "{:?}", file.notes);
+    // No library writes such.
+    assert_eq!(
+        told(&read(&dated(i32::MAX, i64::MAX)).unwrap()),
+        ["a.parquet#0 at=2262-04-11T23:47:16.854775 lanes=3 2"]
+    );
 }

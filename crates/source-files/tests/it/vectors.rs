@@ -14,11 +14,11 @@ use crate::support::{self, Folder, Tiff, ids, remarks};
 const WANTED: Wanted = Wanted { keys: &[], ..support::WANTED };
 
 #[track_caller]
-fn read(path: &Path) -> FeatureFile {
+pub fn read(path: &Path) -> FeatureFile {
     read_features(path, &WANTED, &in_turn).unwrap()
 }
 
-fn tags(feature: &VectorFeature) -> Vec<(&str, &str)> {
+pub fn tags(feature: &VectorFeature) -> Vec<(&str, &str)> {
     feature.tags.iter().map(|(key, value)| (key.as_ref(), value.as_ref())).collect()
 }
 
@@ -159,7 +159,7 @@ fn features_elsewhere_are_counted_and_where_they_lie_is_told() {
 }
 
 /// A GeoPackage geometry: mark, flags, no box, then well-known binary.
-fn blob(kind: u32, runs: &[&[&[f64]]]) -> Vec<u8> {
+pub fn blob(kind: u32, runs: &[&[&[f64]]]) -> Vec<u8> {
     let mut bytes = b"GP\0\x01\0\0\0\0\x01".to_vec();
     bytes.extend(kind.to_le_bytes());
     if kind % 1000 != 2 {
@@ -172,7 +172,7 @@ fn blob(kind: u32, runs: &[&[&[f64]]]) -> Vec<u8> {
     bytes
 }
 
-fn package(folder: &Folder, layers: &[(&str, &[Vec<u8>])]) -> PathBuf {
+pub fn package(folder: &Folder, layers: &[(&str, &[Vec<u8>])]) -> PathBuf {
     let path = folder.path("hydro.gpkg");
     let database = rusqlite::Connection::open(&path).unwrap();
     let tables =
@@ -192,7 +192,7 @@ fn package(folder: &Folder, layers: &[(&str, &[Vec<u8>])]) -> PathBuf {
     path
 }
 
-const RUN: &[&[f64]] = &[&[500_000.0, 3.87e6, 5.0], &[500_100.0, 3.87e6, f64::NAN], &[500_200.0, 3.87e6, 1.0e9]];
+pub const RUN: &[&[f64]] = &[&[500_000.0, 3.87e6, 5.0], &[500_100.0, 3.87e6, f64::NAN], &[500_200.0, 3.87e6, 1.0e9]];
 
 #[test]
 fn a_geopackage_gives_lines_with_heights_and_columns_as_tags() {
@@ -314,7 +314,7 @@ fn a_column_whose_name_is_no_text_is_no_panic() {
 }
 
 /// A record of a Shapefile, whose parts begin at some points.
-fn record(kind: u32, starts: &[u32], points: &[[f64; 3]]) -> Vec<u8> {
+pub fn record(kind: u32, starts: &[u32], points: &[[f64; 3]]) -> Vec<u8> {
     let mut record: Vec<u8> = kind.to_le_bytes().to_vec();
     record.extend([0; 32]);
     record.extend((starts.len() as u32).to_le_bytes());
@@ -349,7 +349,7 @@ fn table(rows: &[&str]) -> Vec<u8> {
     [head, columns, rows.concat().into_bytes()].concat()
 }
 
-fn shapefile(records: &[Vec<u8>]) -> Vec<u8> {
+pub fn shapefile(records: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = vec![0, 0, 0x27, 0x0a];
     bytes.resize(100, 0);
     [bytes, records.concat()].concat()
@@ -363,8 +363,8 @@ fn a_shapefile_gives_lines_with_heights_and_its_table_as_tags() {
         [record(13, &[0], &points), record(3, &[0], &points), record(3, &[0], &points), record(3, &[0], &points)];
     let path = folder.write("roads.shp", &shapefile(&lines));
     let bare = read(&path);
-    assert_eq!((bare.features.len(), bare.notes.len()), (4, 1));
-    assert!(bare.notes[0].contains("no table (.dbf) beside it"), "{:?}", bare.notes);
+    assert_eq!((bare.features.len(), bare.notes.len()), (4, 2));
+    assert!(bare.notes[1].contains("no table (.dbf) beside it"), "{:?}", bare.notes);
     folder.write("roads.DBF", &table(&[" track   2T", "*gone    1F", " \u{e9}    ***?"]));
     folder.write("roads.cpg", b"UTF-8\n");
     let file = read(&path);
