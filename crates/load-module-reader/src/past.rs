@@ -159,7 +159,10 @@ impl LoadedGround {
 
 /// Height of the ground in quanta at a place in quanta of a load module.
 fn ground_under(module: &TerrainModule, side: u16, place: [f64; 2]) -> f64 {
-    module.lookup().height_m(steps_of(place, side)).map_or(f64::NEG_INFINITY, |height_m| height_m * f64::from(QUANTA_PER_METRE))
+    module
+        .lookup()
+        .height_m(steps_of(place, side))
+        .map_or(f64::NEG_INFINITY, |height_m| height_m * f64::from(QUANTA_PER_METRE))
 }
 
 fn length_m(from_m: [f64; 3], to_m: [f64; 3]) -> f64 {

@@ -192,7 +192,8 @@ fn forecast_table(job: &Job, plan: &Plan) -> Table {
     };
     table.row(["Time", &format!("{:.1} s", forecast.seconds), &format!("about, on one core{shared}")]);
     if let Some(metres) = job.tin.target_rms_m.or(job.tin.max_residual_m) {
-        let words = "asked for may end it long before: all of this is the most; tiefort init --rms measures what it takes";
+        let words =
+            "asked for may end it long before: all of this is the most; tiefort init --rms measures what it takes";
         table.row(["Residual", &format!("{metres} m"), words]);
     }
     table
