@@ -69,9 +69,9 @@ pub(crate) struct Place {
     pub below: [u8; 3],
 }
 
-/// The texture of some load modules, whose borders run between texels: where a photo's pixels do, too, and are as large,
-/// texels are its pixels. One texel more lies beyond each border, so that what a program draws between the outermost two
-/// is the same in both of two units beside each other.
+/// The texture of some load modules, whose borders run between texels: where a photo's pixels do, too, and are as
+/// large, texels are its pixels. One texel more lies beyond each border, so that what a program draws between the
+/// outermost two is the same in both of two units beside each other.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// Its file.

@@ -171,8 +171,8 @@ fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
 }
 
 /// Lays lines in the ground onto it where another way has it: at places that lie as high as that way, and inside its
-/// strip. What another line has there at the same height moves with them, so that parts of a way still meet. Returns the
-/// heights of places where they are laid, by what they were.
+/// strip. What another line has there at the same height moves with them, so that parts of a way still meet. Returns
+/// the heights of places where they are laid, by what they were.
 fn lay(middles: &mut [Middle], points: &[(Place, i32)], (faces, site): (&[Face], &Site)) -> HashMap<(Place, i32), i32> {
     let (mut ground, mut inside) = (HashMap::new(), Vec::new());
     for Middle { traits, stations, .. } in middles.iter().filter(|of| is_laid(&of.traits) && of.traits.is_in_ground) {

@@ -49,8 +49,8 @@ pub(crate) struct Matter {
 /// All that a build knows of what it made, in the order in which warnings are told.
 pub(crate) const MATTERS: [Matter; 23] = [
     matter(
-        "files, datums, holes and rules of sources, areas of importance, or metres of the area's system, that are not as \
-         they should be",
+        "files, datums, holes and rules of sources, areas of importance, or metres of the area's system, that are not \
+         as they should be",
         Told::OfStage,
         "the data, or the job, may be other than meant",
     ),
