@@ -65,7 +65,7 @@ impl Frame {
     fn of(scene: &Scene) -> Self {
         let part = scene.part;
         Self {
-            side: (scene.grid.side_cells * scene.frame.spacing.quanta_per_post()),
+            side: scene.grid.side_cells * scene.frame.spacing.quanta_per_post(),
             south_west: ModuleId { row: part.south, col: part.west },
             rows: (part.north - part.south) as i32,
             cols: (part.east - part.west) as i32,
