@@ -182,9 +182,7 @@ pub(crate) fn survey_task(job: &Job, area: &GamingArea, tile: TileId, features: 
         _ => Rule::WorstFirst,
     };
     let owned = with_outer_sides(job, area, tile, area.tiling.owned_sides(tile));
-    let weighs_nothing = |weight: u16| weight == 0;
-    let is_masked = weighs_nothing(job.importance.default_weight)
-        || job.importance.areas.iter().any(|area| weighs_nothing(area.weight));
+    let is_masked = job.importance.weights().any(|weight| weight == 0);
     SurveyTask { growth, owned, grid: area.grid, cost, counts_left: is_masked || job.features.is_none() }
 }
 
@@ -288,6 +286,17 @@ mod tests {
     use terrain::{LatticePoint, PostRect, StopReason, Tin};
 
     use super::*;
+
+    #[test]
+    fn a_residual_within_so_many_steps_is_no_larger_when_it_is_rounded_to_them() {
+        for (metres, quantum) in [(1.0, 1), (1.0, 64), (0.3, 128), (2.5, 100), (0.0, 7)] {
+            let units = units_within(metres, quantum);
+            let most = units * u64::from(quantum) + if quantum == 1 { 0 } else { u64::from(quantum) / 2 };
+            let room = metres * f64::from(terrain::QUANTA_PER_METRE);
+            assert!(units == 0 || most as f64 <= room, "{metres} m in steps of {quantum}");
+            assert!(room < (most + u64::from(quantum)) as f64, "{metres} m in steps of {quantum} leaves out a step");
+        }
+    }
 
     #[test]
     fn border_points_are_handed_on_in_eighths_and_features_between_posts_are_not() {

@@ -30,6 +30,11 @@ impl Carries {
     pub(crate) fn is_one_file(&self) -> bool {
         matches!(self.format, "obj" | "glb")
     }
+
+    /// Whether coarser levels have textures of their own.
+    pub(crate) fn has_textures_of_levels(&self) -> bool {
+        self.textures == TILES.textures
+    }
 }
 
 /// What a format says of what it has no room for.

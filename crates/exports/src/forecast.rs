@@ -2,8 +2,11 @@
 
 use terrain::{ModuleId, ModuleRect};
 
+use crate::detail::{Step, steps};
 use crate::objects::{Facet, things_in};
+use crate::openflight::square_side;
 use crate::ribbons::Ribbons;
+use crate::tiles3d::TEXELS_TO_ERROR;
 use crate::{Carries, ExportError, LEFT_OUT, Product};
 
 /// Load modules whose ribbons and objects are counted, at most: the others have as many on average.
@@ -66,7 +69,8 @@ fn above_ground(product: &Product) -> f64 {
     ids.map(of).sum::<usize>() as f64 * all as f64 / COUNTED_MAX as f64
 }
 
-/// Bytes of textures, as many for each load module as for that in the middle.
+/// Bytes of textures, as many for each load module as for that in the middle, and for coarser levels as many fewer as
+/// their texels are larger there.
 fn texture_bytes(product: &Product, format: &Carries) -> Result<f64, ExportError> {
     let rect = product.rect;
     let (row, col) = (rect.south.midpoint(rect.north), rect.west.midpoint(rect.east));
@@ -76,8 +80,14 @@ fn texture_bytes(product: &Product, format: &Carries) -> Result<f64, ExportError
     // One texture for all has fewer texels.
     let of = |modules: u32| textures.texel_m(side_m, f64::from(modules) * side_m, 0.0);
     let modules_together = if format.is_one_file() { rect.rows().max(rect.cols()) } else { 1 };
-    let finer = of(1) / of(modules_together);
-    Ok(texture.bytes.len() as f64 * rect.count() as f64 * finer * finer)
+    let mut finer = (of(1) / of(modules_together)).powi(2);
+    if format.has_textures_of_levels() {
+        let levels: Vec<Product> = product.levels().collect();
+        let square_m = f64::from(square_side(product)) * side_m;
+        let of_level = |step: &Step| textures.texel_m(side_m, square_m, TEXELS_TO_ERROR * step.error_m);
+        finer += steps(&levels, middle).iter().skip(1).map(|step| (of(1) / of_level(step)).powi(2)).sum::<f64>();
+    }
+    Ok(texture.bytes.len() as f64 * rect.count() as f64 * finer)
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use store::{Folder, Manifest, TileModules};
 use terrain::{
-    GridFrame, HOLE_CLASS, LineForm, LineKind, LoadModule, MaterialName, ModuleGrid, ModuleId, ModuleLine, ModuleRect,
-    OBJECT_MATERIALS, QUANTA_PER_METRE, TileId, plans,
+    GridFrame, HOLE_CLASS, LoadModule, MaterialName, ModuleGrid, ModuleId, ModuleLine, ModuleRect, OBJECT_MATERIALS,
+    QUANTA_PER_METRE, TileId, is_band, plans,
 };
 
 use crate::classes::{Classes, names_in, water_in};
@@ -371,12 +371,6 @@ fn rect_of(manifest: &Manifest, block: Option<Block>) -> Result<ModuleRect, Expo
         expected: format!("load modules from 0,0 to {},{}", rows.saturating_sub(1), cols.saturating_sub(1)),
         hint: "name the south-west one first, then the north-east one, each as ROW,COL".into(),
     })
-}
-
-/// Whether a way is seen as a band: what is in the ground as a line, and has a width.
-pub(crate) fn is_band(line: &ModuleLine) -> bool {
-    let traits = &line.traits;
-    traits.is_in_ground && traits.form == LineForm::Line && traits.kind != LineKind::Breakline && 0 < traits.width
 }
 
 /// The length of all of them.

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
-use terrain::{ModuleRect, ObjectKind, QUANTA_PER_METRE, metres_of_quanta};
+use terrain::{ModuleRect, ObjectKind, QUANTA_PER_METRE, is_band, metres_of_quanta};
 
 use crate::coarse::Coarse;
 use crate::detail::{Step, largest_residual_m, steps};
@@ -28,13 +28,12 @@ use crate::mesh::{Mesh, Part};
 use crate::modules::{group_name, sheet_name};
 use crate::objects::Thing;
 use crate::openflight::{square_name, square_side};
-use crate::product::is_band;
 use crate::skirts::{Depths, Side, Skirt, depths};
 use crate::{Datum, ExportError, Product, Put, Sheet, Texture, Work};
 
 /// Texels of a tile are no finer than this part of its error: where viewers go on to what is finer, at an error of 16
 /// pixels, a texel is two of these.
-const TEXELS_TO_ERROR: f64 = 1.0 / 8.0;
+pub(crate) const TEXELS_TO_ERROR: f64 = 1.0 / 8.0;
 
 /// Writes `tileset.json`, `squares/*.glb`, `groups/*.glb` and, for coarser levels, `levels/K/*.glb`. `assumed` is what
 /// to take heights to be above; else the database says it. Returns what was done to heights.

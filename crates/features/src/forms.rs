@@ -290,8 +290,12 @@ pub(crate) fn shared_places(network: &Network, strands: &[Strand], grants: &Gran
         edges.flat_map(|(_, edge)| [edge.a, edge.b].map(|node| network.nodes[node as usize].place)).collect();
     let mut shared = HashSet::new();
     for (_, strand) in strands.iter().enumerate().filter(|(number, _)| !grants.of_strand(*number).out) {
-        let open = if strand.stations.first() == strand.stations.last() { 1 } else { 0 };
-        shared.extend(strand.stations[open..].iter().map(|(place, _)| *place).filter(|place| !seen.insert(*place)));
+        shared.extend(
+            strand.stations[usize::from(strand.is_closed())..]
+                .iter()
+                .map(|(place, _)| *place)
+                .filter(|place| !seen.insert(*place)),
+        );
     }
     shared
 }

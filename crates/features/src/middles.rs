@@ -60,7 +60,8 @@ pub(crate) fn middles(
     }
     middles.iter_mut().for_each(|middle| cross_lines(&mut middle.stations, site));
     let laid = lay(&mut middles, points, (faces, site));
-    lay_decks(decks, graded, &laid);
+    let station = |node: u32| (graded.network.nodes[node as usize].place, graded.heights[node as usize]);
+    lay_decks(decks, &station, &laid);
     let mut middles: Vec<Middle> = middles.into_iter().flat_map(|middle| in_culverts(middle, points)).collect();
     middles.retain(|middle| 2 <= middle.stations.len());
     middles.sort();
@@ -149,10 +150,8 @@ fn left_out(strand: &Strand, kept: &[&Strand], site: &Site) -> Vec<Strand> {
             let place = station?.0;
             strand.stations.iter().position(|(other, _)| *other == place)
         };
-        // One that is closed ends where it begins.
-        let is_closed = kept.stations.first() == kept.stations.last();
         match (at(kept.stations.first()), at(kept.stations.last())) {
-            (Some(_), Some(_)) if is_closed => is_out.fill(false),
+            (Some(_), Some(_)) if kept.is_closed() => is_out.fill(false),
             (Some(from), Some(to)) if from < to => is_out[from..to].fill(false),
             _ => {}
         }
@@ -204,10 +203,9 @@ fn lay(middles: &mut [Middle], points: &[(Place, i32)], (faces, site): (&[Face],
 }
 
 /// Moves the ends of decks as the stations of lines were.
-fn lay_decks(decks: &mut [Face], graded: &Graded, laid: &HashMap<(Place, i32), i32>) {
-    let station = |node: &u32| (graded.network.nodes[*node as usize].place, graded.heights[*node as usize]);
+fn lay_decks(decks: &mut [Face], station: &dyn Fn(u32) -> (Place, i32), laid: &HashMap<(Place, i32), i32>) {
     for Face { corners, nodes, .. } in decks {
-        let ends: Vec<(Place, i32)> = nodes.iter().map(station).collect();
+        let ends: Vec<(Place, i32)> = nodes.iter().map(|&node| station(node)).collect();
         for corner in corners {
             let nearest = ends.iter().filter(|end| end.1 == corner.1).min_by_key(|end| end.0.squared_to(corner.0));
             corner.1 = nearest.and_then(|end| laid.get(end)).copied().unwrap_or(corner.1);
@@ -306,7 +304,7 @@ fn cross_lines(stations: &mut Vec<(Place, i32)>, site: &Site) {
 mod tests {
     use super::*;
     use crate::samples::{formed, formed_as, site, way};
-    use crate::{Form, Formed};
+    use crate::{Form, Formed, Numbering};
 
     fn of_number(formed: &Formed, number: i64) -> Vec<&Middle> {
         formed.middles.iter().filter(|middle| middle.id.number == number).collect()
@@ -369,6 +367,26 @@ mod tests {
             assert!(parts.iter().all(|part| part.traits.is_kept && part.traits.fit()));
             assert_eq!(parts[1].traits.storey, LineStorey::Tunnel);
         }
+    }
+
+    #[test]
+    fn the_end_of_a_deck_moves_with_its_station_and_the_other_one_stays() {
+        let station = |node: u32| (Place::new(0, 100 * node as i32), 700 + node as i32);
+        let corner = |row, node: u32| (Place::new(row, 100 * node as i32), station(node).1);
+        let deck = Face {
+            class: 1,
+            id: FeatureId { source: 0, numbering: Numbering::Way, number: 1 },
+            corners: vec![corner(-4, 0), corner(-4, 1), corner(4, 1), corner(4, 0)],
+            is_deck: true,
+            centreline: None,
+            nodes: vec![0, 1],
+            wide: None,
+        };
+        let mut decks = [deck.clone()];
+        lay_decks(&mut decks, &station, &HashMap::from([(station(1), 500)]));
+        assert_eq!(decks[0].corners.iter().map(|corner| corner.1).collect::<Vec<_>>(), [700, 500, 500, 700]);
+        lay_decks(&mut decks, &station, &HashMap::from([(station(1), 900)]));
+        assert_eq!(decks[0].corners[0], deck.corners[0]);
     }
 
     #[test]

@@ -84,7 +84,7 @@ pub struct Strand {
 impl Strand {
     /// Whether it ends where it begins.
     pub fn is_closed(&self) -> bool {
-        self.stations.first().map(|(place, _)| place) == self.stations.last().map(|(place, _)| place)
+        self.stations.first() == self.stations.last()
     }
 }
 

@@ -18,15 +18,19 @@ pub struct ImportanceSpec {
 }
 
 impl ImportanceSpec {
+    /// The weights of ground, in thousandths; water and pins not counted.
+    pub fn weights(&self) -> impl Iterator<Item = u16> {
+        self.areas.iter().map(|area| area.weight).chain([self.default_weight])
+    }
+
     /// The largest weight of any ground, in thousandths; water and pins not counted.
     pub fn heaviest(&self) -> u16 {
-        self.areas.iter().map(|area| area.weight).fold(self.default_weight, u16::max)
+        self.weights().max().unwrap_or(self.default_weight)
     }
 
     /// The least weight of any ground that counts, in thousandths; water and pins not counted.
     pub fn lightest(&self) -> u16 {
-        let weights = self.areas.iter().map(|area| area.weight).chain([self.default_weight]);
-        weights.filter(|weight| 0 < *weight).min().unwrap_or(1)
+        self.weights().filter(|weight| 0 < *weight).min().unwrap_or(1)
     }
 }
 

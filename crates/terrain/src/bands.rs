@@ -3,42 +3,115 @@
 //! Where a way turns, the bands before and after it are mitred. Where it turns back, where several ways or unlike
 //! widths meet, and where a way ends, a disc joins them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use crate::plans::{At, Ring};
-use crate::{Flat, LineForm, LineKind, ModuleLine};
+use crate::plans::{At, Ring, difference, triangles};
+use crate::{Draped, Flat, HOLE_CLASS, LineForm, LineKind, LoadModule, ModuleId, ModuleLine, ModuleRect};
 
-/// A way in one load module.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Band {
-    /// Its kind and class: travelled ways come before channels.
-    pub order: (LineKind, u8),
-    /// Its width in quanta.
-    pub width: u16,
-    /// Two or more places of its middle, in quanta.
-    pub places: Vec<At>,
+/// Travelled ways before channels, each by class: what comes first covers the others.
+type Order = (LineKind, u8);
+
+/// Whether a line is a band: a way in the ground that has a width, and no triangles of its own.
+pub fn is_band(line: &ModuleLine) -> bool {
+    let traits = &line.traits;
+    let is_way = traits.kind != LineKind::Breakline && traits.form == LineForm::Line;
+    traits.is_in_ground && is_way && 0 < traits.width
 }
 
-impl Band {
-    /// That of a line of a load module whose south-west corner stands at `corner`; `None` where the line is none: it
-    /// has triangles of its own, or no width, or is not in the ground.
-    pub fn of(line: &ModuleLine, corner: At) -> Option<Self> {
-        let traits = &line.traits;
-        let is_way = traits.kind != LineKind::Breakline && traits.form == LineForm::Line;
-        let place = |vertex: &crate::ModuleVertex| [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y)];
-        (traits.is_in_ground && is_way && 0 < traits.width).then(|| Self {
-            order: (traits.kind, line.class),
-            width: traits.width,
-            places: line.vertices.iter().map(place).collect(),
-        })
+/// Pieces of bands by load module and class. Places are quanta from the south-west corner of the rectangle of load
+/// modules that they lie in.
+pub struct Bands {
+    pieces: BTreeMap<ModuleId, BTreeMap<Order, Vec<Ring>>>,
+    /// Classes of ground that bands give way to: those of ways, which strips have, and holes.
+    taken: BTreeSet<u8>,
+    rect: ModuleRect,
+    side: i32,
+}
+
+impl Bands {
+    /// Those of lines, each of a load module in `rect`, whose sides are `side` quanta.
+    pub fn of<'a>(
+        lines: impl Iterator<Item = (ModuleId, &'a ModuleLine)> + Clone,
+        rect: ModuleRect,
+        side: i32,
+    ) -> Self {
+        let taken = lines.clone().map(|(_, line)| line.class).chain([HOLE_CLASS]).collect();
+        let mut all = Self { pieces: BTreeMap::new(), taken, rect, side };
+        let bands: Vec<Band> =
+            lines.filter(|(_, line)| is_band(line)).map(|(id, line)| Band::of(line, all.corner(id))).collect();
+        let ends = Ends::of(&bands);
+        for band in &bands {
+            for ring in rings(band, &ends) {
+                for id in all.under(&ring) {
+                    all.pieces.entry(id).or_default().entry(band.order).or_default().push(ring.clone());
+                }
+            }
+        }
+        all
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    /// The bands over a load module by class, as convex polygons at the height of its ground. No two lie in one place:
+    /// those of one class are united, and what one of an earlier class covers, or a strip, is left to that.
+    pub fn over(&self, module: &LoadModule) -> Vec<(u8, Vec<Vec<[f64; 3]>>)> {
+        let Some(by_order) = self.pieces.get(&module.id) else { return Vec::new() };
+        let ground = Draped::of(module, self.corner(module.id)).without(module, &self.taken);
+        let mut before: Vec<Ring> = Vec::new();
+        let mut over = Vec::new();
+        for ((_, class), rings) in by_order {
+            let mut polygons = Vec::new();
+            for plan in difference(std::slice::from_ref(rings), std::slice::from_ref(&before)) {
+                let (places, triangles) = triangles(&plan);
+                for corners in triangles {
+                    let corners: [Flat; 3] = corners.map(|at| places[at as usize].map(f64::from));
+                    polygons.extend(ground.under(&corners));
+                }
+            }
+            before.extend(rings.iter().cloned());
+            over.push((*class, polygons));
+        }
+        over
+    }
+
+    fn corner(&self, id: ModuleId) -> At {
+        [(id.col - self.rect.west) as i32 * self.side, (id.row - self.rect.south) as i32 * self.side]
+    }
+
+    /// The load modules that a ring may reach.
+    fn under(&self, ring: &Ring) -> Vec<ModuleId> {
+        let Self { rect, side, .. } = *self;
+        let span = |axis: usize, count: u32| {
+            let of = || ring.iter().map(|at| at[axis].div_euclid(side));
+            of().min().unwrap_or(0).max(0)..=of().max().unwrap_or(0).min(count as i32 - 1)
+        };
+        let (rows, cols) = (span(1, rect.rows()), span(0, rect.cols()));
+        let id = |row: i32, col: i32| ModuleId { row: rect.south + row as u32, col: rect.west + col as u32 };
+        rows.flat_map(|row| cols.clone().map(move |col| id(row, col))).collect()
     }
 }
 
-/// The plans of bands, counter-clockwise and convex: for each band a ring for each stretch between two places, and a
-/// disc where stretches are not mitred.
-pub fn band_rings(bands: &[Band]) -> Vec<Vec<Ring>> {
-    let ends = Ends::of(bands);
-    bands.iter().map(|band| rings(band, &ends)).collect()
+/// A way in one load module.
+struct Band {
+    order: Order,
+    width: u16,
+    /// Two or more places of its middle.
+    places: Vec<At>,
+}
+
+impl Band {
+    /// That of a line of a load module whose south-west corner stands at `corner`.
+    fn of(line: &ModuleLine, corner: At) -> Self {
+        let place = |vertex: &crate::ModuleVertex| [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y)];
+        Self {
+            order: (line.traits.kind, line.class),
+            width: line.traits.width,
+            places: line.vertices.iter().map(place).collect(),
+        }
+    }
 }
 
 /// Corners of a disc, in halves of the width, counter-clockwise.
@@ -63,7 +136,7 @@ const DISC: [Flat; 12] = {
 const MITRE_COSINE_MIN: f64 = -0.3;
 
 /// For each end of bands of one order and width, the places that come next on each band there.
-struct Ends(HashMap<((LineKind, u8), u16, At), Vec<At>>);
+struct Ends(HashMap<(Order, u16, At), Vec<At>>);
 
 impl Ends {
     fn of(bands: &[Band]) -> Self {
@@ -86,6 +159,8 @@ impl Ends {
     }
 }
 
+/// The plans of a band, counter-clockwise and convex: a ring for each stretch between two places, and a disc where
+/// stretches are not mitred.
 fn rings(band: &Band, ends: &Ends) -> Vec<Ring> {
     let Band { width, places, .. } = band;
     let last = places.len() - 1;
@@ -133,6 +208,11 @@ mod tests {
 
     fn road(width: u16, places: &[At]) -> Band {
         Band { order: (LineKind::Travelled, 1), width, places: places.to_vec() }
+    }
+
+    fn band_rings(bands: &[Band]) -> Vec<Vec<Ring>> {
+        let ends = Ends::of(bands);
+        bands.iter().map(|band| rings(band, &ends)).collect()
     }
 
     fn covers(rings: &[Vec<Ring>], at: At) -> bool {

@@ -43,7 +43,7 @@ pub use materials::{FEATURE_COLORS, MaterialName, OBJECT_MATERIALS, named_class_
 mod draped;
 pub use draped::{Draped, Flat};
 mod bands;
-pub use bands::{Band, band_rings};
+pub use bands::{Bands, is_band};
 mod each;
 pub use each::{Each, gather, in_turn};
 

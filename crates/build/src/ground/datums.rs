@@ -31,9 +31,12 @@ pub fn judge_datums(
     datums: &[(&SourceFile, Option<String>)],
 ) -> Result<Datums, GroundError> {
     let mut found = Datums { shifts: vec![None; datums.len()], warnings: Vec::new() };
-    // Where no source says anything, the job's word stands for all.
-    let Some(known) = datums.iter().find_map(|(_, datum)| datum.clone()) else { return Ok(found) };
-    let wanted = job.dem.vertical_datum.clone().unwrap_or(known);
+    let known = datums.iter().find_map(|(_, datum)| datum.clone());
+    // Where no source says anything, the job's word stands for all, unless it names grids to bring one to another.
+    if known.is_none() && job.dem.geoids.is_empty() {
+        return Ok(found);
+    }
+    let Some(wanted) = job.dem.vertical_datum.clone().or(known) else { return Ok(found) };
     let mut grids = Grids { job, area, read: Vec::new() };
     for (shift, (file, datum)) in found.shifts.iter_mut().zip(datums) {
         match datum {

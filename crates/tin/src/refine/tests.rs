@@ -279,6 +279,29 @@ fn no_border_point_is_selected_where_a_road_crosses_a_side() {
     }
 }
 
+#[test]
+fn a_survey_sets_aside_what_no_post_lowers_unless_it_is_counted() {
+    let rect = PostRect::of_size(41, 41);
+    let inside = |post: Post| (10..30).contains(&post.row) && (10..30).contains(&post.col);
+    // A block of which nothing may be chosen, and a slope that one plane holds around it.
+    let dem = Dem::from_fn(rect, |post| Some(if inside(post) { 9000 } else { 16 * post.row }));
+    let posts = (0..=40).flat_map(|row| (0..=40).map(move |col| Post::new(row, col)));
+    let weights = posts.map(|post| if inside(post) { 0 } else { 1000 }).collect();
+    let importance = Importance::new(rect, weights, vec![0; rect.post_count()]);
+    let growth = TileTask {
+        stop: Stop { rms_quanta: Some(0.0), ..Stop::default() },
+        ..plain_task(rect, Rule::LargestSquares { guard: None }, 0)
+    };
+    let squares_at_end = |counts_left| {
+        let (owned, grid) = (SeamSides::CLOSED, ModuleGrid { rows: 2, cols: 2, side_cells: 20 });
+        let task = SurveyTask { growth: growth.clone(), owned, grid, cost: crate::CostUnit::Triangles, counts_left };
+        crate::survey(&dem, &importance, &task, widest_level()).squares.last().map(|(_, sum)| *sum)
+    };
+    let counted = squares_at_end(true).expect("sums of squares");
+    assert!(400.0 * 8000.0 * 8000.0 < counted, "{counted}");
+    assert_eq!(squares_at_end(false), Some(0.0));
+}
+
 fn limited(rect: PostRect, module_room: u32, window_room: u32, triangles: u32, rule: Rule) -> TileTask {
     let grid = ModuleGrid { rows: 4, cols: 4, side_cells: 20 };
     let modules = ModuleRect { south: 0, west: 0, north: 4, east: 4 };

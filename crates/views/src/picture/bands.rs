@@ -1,9 +1,6 @@
 //! Roads, rails and streams that are lines in the ground, as bands on its triangles.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use terrain::plans::{Ring, difference, triangles};
-use terrain::{Band, Draped, Flat, HOLE_CLASS, LineKind, LoadModule, ModuleId, QUANTA_PER_METRE, band_rings};
+use terrain::{Bands, LoadModule, ModuleId, QUANTA_PER_METRE};
 
 use super::scene::{Scene, SceneFeatures};
 
@@ -14,32 +11,26 @@ const REACH_M: f64 = 6_000.0;
 
 /// A triangle of a band in metres from the area's south-west post, and its place among the colours of features.
 type Piece = ([[f64; 3]; 3], u8);
-/// Rings by kind and class: what comes first covers the others.
-type Rings = BTreeMap<(LineKind, u8), Vec<Ring>>;
 
 /// The bands of a scene around a place, in metres from the area's south-west post, draped over the ground of its load
 /// modules; strips, which have triangles, cover them.
 pub(crate) fn bands_of(scene: &Scene, features: &SceneFeatures, place_m: [f64; 2]) -> Vec<Piece> {
-    let frame = Frame::of(scene);
     let modules: Vec<&LoadModule> =
         scene.modules.iter().filter(|module| away_m(module.id, scene.side_m(), place_m) < REACH_M).collect();
-    let lines =
-        || modules.iter().flat_map(|module| module.lines.iter().map(move |line| (line, frame.corner(module.id))));
-    let bands: Vec<Band> = lines().filter_map(|(line, corner)| Band::of(line, corner)).collect();
-    let taken: BTreeSet<u8> = lines().map(|(line, _)| line.class).chain([HOLE_CLASS]).collect();
-    let mut by_module: BTreeMap<ModuleId, Rings> = BTreeMap::new();
-    for (band, rings) in bands.iter().zip(band_rings(&bands)) {
-        for ring in rings {
-            for id in frame.under(&ring) {
-                by_module.entry(id).or_default().entry(band.order).or_default().push(ring.clone());
-            }
+    let lines = modules.iter().flat_map(|module| module.lines.iter().map(|line| (module.id, line)));
+    let side = scene.grid.side_cells * scene.frame.spacing.quanta_per_post();
+    let bands = Bands::of(lines, scene.part, side);
+    let first = [scene.part.west, scene.part.south].map(|at| f64::from(at) * f64::from(side));
+    let metre = f64::from(QUANTA_PER_METRE);
+    let place = |[x, y, z]: [f64; 3]| [(x + first[0]) / metre, (y + first[1]) / metre, z / metre + UP_M];
+    let mut pieces = Vec::new();
+    for (class, polygons) in modules.iter().flat_map(|module| bands.over(module)) {
+        let Some(number) = features.color_of(class) else { continue };
+        for piece in polygons {
+            pieces.extend((2..piece.len()).map(|i| ([piece[0], piece[i - 1], piece[i]].map(place), number)));
         }
     }
-    let of_module = |module: &&LoadModule| {
-        let rings = by_module.get(&module.id)?;
-        Some(frame.pieces(module, rings, &taken, features))
-    };
-    modules.iter().filter_map(of_module).flatten().collect()
+    pieces
 }
 
 /// How far a load module lies from a place, in metres.
@@ -50,70 +41,6 @@ fn away_m(id: ModuleId, side_m: f64, place_m: [f64; 2]) -> f64 {
     };
     let (east, north) = (beside(0, id.col), beside(1, id.row));
     (east * east + north * north).sqrt()
-}
-
-/// Where load modules lie: places are quanta from the south-west corner of the part that is looked at.
-#[derive(Clone, Copy)]
-struct Frame {
-    side: i32,
-    south_west: ModuleId,
-    rows: i32,
-    cols: i32,
-}
-
-impl Frame {
-    fn of(scene: &Scene) -> Self {
-        let part = scene.part;
-        Self {
-            side: scene.grid.side_cells * scene.frame.spacing.quanta_per_post(),
-            south_west: ModuleId { row: part.south, col: part.west },
-            rows: (part.north - part.south) as i32,
-            cols: (part.east - part.west) as i32,
-        }
-    }
-
-    fn corner(&self, id: ModuleId) -> [i32; 2] {
-        [(id.col - self.south_west.col) as i32 * self.side, (id.row - self.south_west.row) as i32 * self.side]
-    }
-
-    /// The load modules that a ring may reach.
-    fn under(&self, ring: &Ring) -> Vec<ModuleId> {
-        let span = |axis: usize, count: i32| {
-            let of = || ring.iter().map(|at| at[axis].div_euclid(self.side));
-            of().min().unwrap_or(0).max(0)..=of().max().unwrap_or(0).min(count - 1)
-        };
-        let (rows, cols) = (span(1, self.rows), span(0, self.cols));
-        let id = |row: i32, col: i32| ModuleId {
-            row: self.south_west.row + row as u32,
-            col: self.south_west.col + col as u32,
-        };
-        rows.flat_map(|row| cols.clone().map(move |col| id(row, col))).collect()
-    }
-
-    /// The triangles of the bands over a load module.
-    fn pieces(&self, module: &LoadModule, rings: &Rings, taken: &BTreeSet<u8>, features: &SceneFeatures) -> Vec<Piece> {
-        let ground = Draped::of(module, self.corner(module.id)).without(module, taken);
-        let first = [self.south_west.col, self.south_west.row].map(|at| f64::from(at) * f64::from(self.side));
-        let metre = f64::from(QUANTA_PER_METRE);
-        let place = |[x, y, z]: [f64; 3]| [(x + first[0]) / metre, (y + first[1]) / metre, z / metre + UP_M];
-        let mut before: Vec<Ring> = Vec::new();
-        let mut pieces = Vec::new();
-        for ((_, class), rings) in rings {
-            let number = features.color_of(*class);
-            for plan in difference(std::slice::from_ref(rings), std::slice::from_ref(&before)) {
-                let (places, triangles) = triangles(&plan);
-                for corners in triangles {
-                    let corners: [Flat; 3] = corners.map(|at| places[at as usize].map(f64::from));
-                    for piece in ground.under(&corners) {
-                        let fan = (2..piece.len()).map(|i| [piece[0], piece[i - 1], piece[i]].map(place));
-                        pieces.extend(number.into_iter().flat_map(|number| fan.clone().map(move |at| (at, number))));
-                    }
-                }
-            }
-            before.extend(rings.iter().cloned());
-        }
-        pieces
-    }
 }
 
 #[cfg(test)]
