@@ -1,13 +1,13 @@
 //! Lines and polygons from GeoJSON, with its properties as tags.
 
-use geojson::{Feature, GeoJson, JsonValue};
+use geojson::{GeoJson, JsonValue};
 
 use super::columns::{Texts, with_packed_tags};
-use super::loose::{self, Loose};
+use super::loose::{Loose, Written, with_numbers};
 use super::model::{FeatureFile, Wanted, file_name};
 use super::placing::{Placing, look_like_degrees};
 use super::raw::RawFeature;
-use super::strict::{self, said_by, said_in, shape_of};
+use super::strict::said_by;
 use super::value::Value;
 use crate::SourceError;
 use crate::crs::Crs;
@@ -17,21 +17,19 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     let path = store.path();
     let broken = |reason: String| SourceError::NotGeoJson { path: path.into(), reason };
     let text = &*store.text(|| broken("it is not UTF-8 text".into()))?;
-    let (said, features) = match text.parse::<GeoJson>() {
-        Ok(json) => {
-            let said = wanted.system(|| said_in(path, &json))?;
-            let loose =
-                |Feature { geometry, properties, .. }| Loose { properties, shape: geometry.map(|of| Ok(shape_of(of))) };
-            (said, strict::features(json).into_iter().map(loose).collect())
-        }
-        Err(error) => {
-            let (crs, features) = loose::read(text).ok_or_else(|| broken(error.to_string()))?;
-            (wanted.system(|| said_by(path, crs.as_ref()))?, features)
+    let with_nulls;
+    let written = match Written::of(text) {
+        Some(written) => written,
+        None => {
+            with_nulls = with_numbers(text);
+            let reason = || text.parse::<GeoJson>().err().map_or("it is none".to_owned(), |error| error.to_string());
+            Written::of(&with_nulls).ok_or_else(|| broken(reason()))?
         }
     };
+    let said = wanted.system(|| said_by(path, written.crs.as_ref()))?;
     let (name, mut texts) = (file_name(store), Texts::default());
     let (mut raw, mut faults) = (Vec::new(), Vec::new());
-    for (index, Loose { properties, shape }) in features.into_iter().enumerate() {
+    for (index, Loose { properties, shape }) in written.features().enumerate() {
         let id = format!("{name}#{index}");
         let shape = match shape {
             // A feature without a geometry is legal and adds nothing.

@@ -1,10 +1,14 @@
-//! GeoJSON in which something is wrong with single features: numbers that are none, geometries that are none. It is
-//! taken apart by hand, so that one of them does not cost all others.
+//! GeoJSON one feature after the other: those in which something is wrong, as numbers that are none, are taken apart by
+//! hand, so that one of them does not cost all others.
 
-use geojson::{JsonObject, JsonValue};
+use std::collections::BTreeMap;
+
+use geojson::{Feature, JsonObject, JsonValue};
+use serde_json::value::RawValue;
 
 use super::clip::Vertex;
 use super::raw::{Part, RawShape};
+use super::strict;
 
 /// One feature: its properties, and its shape or what is wrong with it; none where it has no geometry.
 pub(super) struct Loose {
@@ -12,24 +16,42 @@ pub(super) struct Loose {
     pub shape: Option<Result<RawShape, String>>,
 }
 
-/// The features in a text, and what it says of its coordinate system; `None` when it is no JSON or holds no geometry.
-pub(super) fn read(text: &str) -> Option<(Option<JsonValue>, Vec<Loose>)> {
-    let value: JsonValue = text.parse().or_else(|_| with_numbers(text).parse()).ok()?;
-    let JsonValue::Object(mut all) = value else { return None };
-    let crs = all.remove("crs").filter(|crs| !crs.is_null());
-    let features = match all.get("type")?.as_str()? {
-        "FeatureCollection" => match all.remove("features")? {
-            JsonValue::Array(features) => features.into_iter().map(feature).collect(),
+/// A text of GeoJSON, whose features are not read yet.
+pub(super) struct Written<'a> {
+    /// What it says of its coordinate system.
+    pub crs: Option<JsonValue>,
+    features: Vec<&'a str>,
+    /// How each of them is read.
+    read: fn(&str) -> Loose,
+}
+
+impl<'a> Written<'a> {
+    /// `None` when the text is no JSON or none of GeoJSON's types.
+    pub fn of(text: &'a str) -> Option<Self> {
+        let members: BTreeMap<String, &RawValue> = serde_json::from_str(text).ok()?;
+        let kind: String = serde_json::from_str(members.get("type")?.get()).ok()?;
+        let (features, read): (_, fn(&str) -> Loose) = match kind.as_str() {
+            "FeatureCollection" => {
+                let features: Vec<&RawValue> = serde_json::from_str(members.get("features")?.get()).ok()?;
+                (features.into_iter().map(RawValue::get).collect(), feature)
+            }
+            "Feature" => (vec![text], feature),
+            "Point" | "LineString" | "Polygon" | "MultiPoint" | "MultiLineString" | "MultiPolygon"
+            | "GeometryCollection" => (vec![text], bare_geometry),
             _ => return None,
-        },
-        "Feature" => vec![feature(JsonValue::Object(all))],
-        _ => vec![Loose { properties: None, shape: Some(Ok(shape_of(&JsonValue::Object(all)).ok()?)) }],
-    };
-    Some((crs, features))
+        };
+        let crs = members.get("crs").and_then(|crs| serde_json::from_str(crs.get()).ok());
+        Some(Self { crs: crs.filter(|crs: &JsonValue| !crs.is_null()), features, read })
+    }
+
+    /// Its features, read one by one.
+    pub fn features(&self) -> impl Iterator<Item = Loose> {
+        self.features.iter().map(|text| (self.read)(text))
+    }
 }
 
 /// The same text, with `null` for what some programs write in place of a number that is none.
-fn with_numbers(text: &str) -> String {
+pub(super) fn with_numbers(text: &str) -> String {
     let mut clean = String::with_capacity(text.len());
     let (mut rest, mut in_string) = (text, false);
     while let Some(first) = rest.chars().next() {
@@ -59,8 +81,20 @@ fn with_numbers(text: &str) -> String {
     clean
 }
 
-fn feature(value: JsonValue) -> Loose {
-    let JsonValue::Object(mut members) = value else {
+fn value_of(text: &str) -> JsonValue {
+    let value = serde_json::from_str(text).or_else(|_| serde_json::from_str(&with_numbers(text)));
+    value.unwrap_or_default()
+}
+
+fn bare_geometry(text: &str) -> Loose {
+    Loose { properties: None, shape: Some(shape_of(&value_of(text))) }
+}
+
+fn feature(text: &str) -> Loose {
+    if let Ok(Feature { geometry, properties, .. }) = serde_json::from_str(text) {
+        return Loose { properties, shape: geometry.map(|geometry| Ok(strict::shape_of(geometry))) };
+    }
+    let JsonValue::Object(mut members) = value_of(text) else {
         return Loose { properties: None, shape: Some(Err("a feature that is none".into())) };
     };
     let properties = match members.remove("properties") {
@@ -91,14 +125,8 @@ fn add(geometry: &JsonValue, shape: &mut RawShape) -> Result<(), String> {
             list("coordinates")?.iter().try_for_each(|rings| add_polygon(rings.as_array().ok_or_else(none)?, shape))
         }
         "GeometryCollection" => list("geometries")?.iter().try_for_each(|geometry| add(geometry, shape)),
-        "Point" => {
-            shape.other = Some("Point");
-            Ok(())
-        }
-        "MultiPoint" => {
-            shape.other = Some("MultiPoint");
-            Ok(())
-        }
+        "Point" => add_points(std::slice::from_ref(geometry.get("coordinates").ok_or_else(none)?), shape),
+        "MultiPoint" => add_points(list("coordinates")?, shape),
         _ => Err(none()),
     }
 }
@@ -106,6 +134,12 @@ fn add(geometry: &JsonValue, shape: &mut RawShape) -> Result<(), String> {
 fn add_line(places: &[JsonValue], shape: &mut RawShape) -> Result<(), String> {
     let line = vertices(places, shape)?;
     shape.parts.push(Part::Line(line));
+    Ok(())
+}
+
+fn add_points(places: &[JsonValue], shape: &mut RawShape) -> Result<(), String> {
+    let points = vertices(places, shape)?;
+    shape.parts.extend(points.into_iter().map(Part::Point));
     Ok(())
 }
 
@@ -140,6 +174,8 @@ mod tests {
         let text = r#"{"a": [NaN, -Infinity, 1e999, -1.5e3, true, "NaN \" 1e999"], "b": null}"#;
         let clean = r#"{"a": [null, null, null, -1.5e3, true, "NaN \" 1e999"], "b": null}"#;
         assert_eq!(with_numbers(text), clean);
-        assert!(read("{NaN").is_none() && read("[1]").is_none() && read(r#"{"type": "Topology"}"#).is_none());
+        for text in ["{NaN", "[1]", r#"{"type": "Topology"}"#, r#"{"type": "FeatureCollection"}"#] {
+            assert!(Written::of(text).is_none(), "{text}");
+        }
     }
 }

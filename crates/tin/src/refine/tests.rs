@@ -12,7 +12,7 @@ use terrain::{
 
 use super::*;
 use crate::batch::is_near;
-use crate::{Frame, Proximity};
+use crate::{CostUnit, Frame, Proximity, SurveyTask, survey};
 
 /// Hills with plateaus: coarse steps, so that equal residuals are common.
 fn hills(rect: PostRect, seed: u64, step: i32) -> Dem {
@@ -294,8 +294,8 @@ fn a_survey_sets_aside_what_no_post_lowers_unless_it_is_counted() {
     };
     let squares_at_end = |counts_left| {
         let (owned, grid) = (SeamSides::CLOSED, ModuleGrid { rows: 2, cols: 2, side_cells: 20 });
-        let task = SurveyTask { growth: growth.clone(), owned, grid, cost: crate::CostUnit::Triangles, counts_left };
-        crate::survey(&dem, &importance, &task, widest_level()).squares.last().map(|(_, sum)| *sum)
+        let task = SurveyTask { growth: growth.clone(), owned, grid, cost: CostUnit::Triangles, counts_left };
+        survey(&dem, &importance, &task, widest_level()).squares.last().map(|(_, sum)| *sum)
     };
     let counted = squares_at_end(true).expect("sums of squares");
     assert!(400.0 * 8000.0 * 8000.0 < counted, "{counted}");
