@@ -45,7 +45,7 @@ fn away_m(id: ModuleId, side_m: f64, place_m: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{LineForm, LineStorey, LineTraits, ModuleLine, ModuleVertex};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleLine, ModuleVertex};
 
     use super::super::color::FEATURES;
     use super::super::scene::SceneLimits;
