@@ -10,7 +10,9 @@ use terrain::{
     Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, ModuleLine, ModuleResidual, Post, PostRect,
     TileId, Tin, Vertex, in_turn,
 };
-use tin::load_modules::{ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, stand};
+use tin::load_modules::{
+    ClipHeights, Layout, clear_decks, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, stand,
+};
 
 use crate::ground::Window;
 use crate::keys::{self, StampOf};
@@ -131,7 +133,11 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
         lines.iter().filter(|line| keys::has_deck(&line.traits)).cloned().collect()
     };
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
-    let decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
+    let mut decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
+    let is_of_features = |class: u8| class == HOLE_CLASS || run.job.is_of_features(class);
+    for ((module, lines), ((decks, most), _)) in modules.iter_mut().zip(&lines).zip(&mut decks) {
+        *most -= clear_decks(module, decks, lines, is_of_features, *most - decks.triangles.len());
+    }
     lift(&mut modules, &decks);
     if keys::have_lines(run.job) {
         modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);

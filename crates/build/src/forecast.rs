@@ -113,6 +113,8 @@ const BYTES_PER_SOURCE_POST: u64 = 4;
 const MEMORY_FEATURES: (u64, f64) = (60, 10e3);
 /// Bytes more for such a byte where the page draws objects.
 const MEMORY_OBJECTS: u64 = 60;
+/// Bytes on disk for such a byte: what tiles have of features, features.gpkg, features.geojson.
+const DISK_FEATURES: u64 = 17;
 /// Seconds for such a byte: to read it, and to decide heights and shapes of what it says.
 const FEATURES_S: f64 = 2.5e-6;
 
@@ -215,7 +217,8 @@ fn disk_bytes(job: &Job, size: &Size) -> u64 {
     let module = if matches!(job.modules.edges, Edges::Clip(_)) { 2 * module } else { module };
     let page = if size.has_maps_on_page() { DISK_PAGE.0 } else { DISK_PAGE.1 };
     let levels = size.triangles as f64 * triangles_of_levels(job) * DISK_LEVEL_TRIANGLE;
-    size.triangles * (tile + module + curve) + levels as u64 + size.tiles * DISK_TILE + page
+    let features = DISK_FEATURES * bytes_of_features(job, size);
+    size.triangles * (tile + module + curve) + levels as u64 + size.tiles * DISK_TILE + page + features
 }
 
 fn shared_bytes(job: &Job, size: &Size) -> u64 {

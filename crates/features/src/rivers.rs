@@ -104,7 +104,10 @@ pub fn fall(
     remarks: &mut Vec<Remark>,
 ) -> Fallen {
     let ground = filled(network, bed.ground);
-    let turned = orient(network, bed.ground, remarks);
+    // Still water says nothing of which way a river runs: where one leaves a lake through a rim, only the rim would.
+    let mut flowing = bed.ground.to_vec();
+    still.iter().flat_map(|still| &still.nodes).for_each(|&node| flowing[node as usize] = None);
+    let turned = orient(network, &flowing, remarks);
     let directed: Vec<(u32, u32)> = network
         .edges
         .iter()
@@ -286,37 +289,77 @@ fn remark_moved(network: &Network, still: &[Still], levels: &[i64], remarks: &mu
 const SAVED_MIN: i64 = terrain::QUANTA_PER_METRE as i64;
 
 /// Which edges flow against the direction of their way. A way is turned round when the sum of distances between its
-/// ground and the nearest profile that falls is halved by that, and well beyond noise. Where there is no ground, as
-/// beyond the area, nothing speaks for either.
+/// ground and the nearest profile that falls is halved by that, and well beyond noise; where the source is none that
+/// draws rivers downstream, the lower end decides, unless that is as clearly wrong. Where there is no ground, as beyond
+/// the area, nothing speaks for either.
 fn orient(network: &Network, ground: &[Option<i32>], remarks: &mut Vec<Remark>) -> Vec<bool> {
-    let mut turned = vec![false; network.edges.len()];
+    let mut ways = Vec::new();
     let mut first = 0;
     for edges in network.edges.chunk_by(|a, b| a.way == b.way) {
         let of_way = first..first + edges.len();
         first += edges.len();
-        if edges[0].a == edges[edges.len() - 1].b {
-            // A closed way has no lower end.
-            continue;
-        }
+        // A closed way has no lower end.
         let nodes = [edges[0].a].into_iter().chain(edges.iter().map(|edge| edge.b));
         let along: Vec<i32> = nodes.filter_map(|node| ground[node as usize]).collect();
-        let (Some(first_known), Some(last_known)) = (along.first(), along.last()) else { continue };
-        let id = network.ways[edges[0].way as usize].id;
-        let uphill = first_known < last_known;
-        let drawn_downhill = id.numbering != Numbering::Row;
-        let forth = cost_of_falling(along.iter().copied());
-        let back = cost_of_falling(along.iter().rev().copied());
-        let saves = |from: i64, to: i64| 2 * to < from && SAVED_MIN * (along.len() as i64) < from - to;
-        let turn = if drawn_downhill || !uphill { saves(forth, back) } else { !saves(back, forth) };
-        if turn {
-            turned[of_way].fill(true);
-        }
-        if turn && drawn_downhill {
-            let place = network.nodes[edges[0].a as usize].place;
-            Notes { id, lattice: network.lattice, remarks }.write_at(place, Flaw::FlowsUphill, Remedy::TurnedRound);
+        if edges[0].a != edges[edges.len() - 1].b && !along.is_empty() {
+            ways.push((of_way, network.ways[edges[0].way as usize].id, Course::of(&along)));
         }
     }
+    // OpenStreetMap's rivers are drawn downstream; so are those of a source most of which clearly fall so.
+    let mut clear: BTreeMap<u32, [u32; 2]> = BTreeMap::new();
+    for (_, id, course) in &ways {
+        let [falls, rises] = clear.entry(id.source).or_default();
+        *falls += u32::from(course.clearly_falls());
+        *rises += u32::from(course.clearly_rises());
+    }
+    let drawn_downhill = |id: &FeatureId| {
+        let [falls, rises] = clear[&id.source];
+        id.numbering != Numbering::Row || 4 * rises < falls
+    };
+    let mut turned = vec![false; network.edges.len()];
+    for (of_way, id, course) in ways {
+        let drawn_downhill = drawn_downhill(&id);
+        let turns = match drawn_downhill || !course.ends_higher {
+            true => course.clearly_rises(),
+            false => !course.clearly_falls(),
+        };
+        if !turns {
+            continue;
+        }
+        if drawn_downhill {
+            let place = network.nodes[network.edges[of_way.start].a as usize].place;
+            Notes { id, lattice: network.lattice, remarks }.write_at(place, Flaw::FlowsUphill, Remedy::TurnedRound);
+        }
+        turned[of_way].fill(true);
+    }
     turned
+}
+
+/// What the ground along a way says of its direction.
+struct Course {
+    stations: i64,
+    ends_higher: bool,
+    /// Distances between the ground and the nearest profile that falls as it is drawn, and the other way.
+    costs: [i64; 2],
+}
+
+impl Course {
+    fn of(along: &[i32]) -> Self {
+        let costs = [cost_of_falling(along.iter().copied()), cost_of_falling(along.iter().rev().copied())];
+        Self { stations: along.len() as i64, ends_higher: along.first() < along.last(), costs }
+    }
+
+    fn clearly_falls(&self) -> bool {
+        self.saves(self.costs[1], self.costs[0])
+    }
+
+    fn clearly_rises(&self) -> bool {
+        self.saves(self.costs[0], self.costs[1])
+    }
+
+    fn saves(&self, from: i64, to: i64) -> bool {
+        2 * to < from && SAVED_MIN * self.stations < from - to
+    }
 }
 
 /// The least sum of distances between values and a sequence that never rises: each value that rises above the lowest
@@ -477,6 +520,25 @@ mod tests {
         assert!(fallen.turned.iter().all(|turned| *turned));
         assert_eq!(remarks[0].flaw, Flaw::FlowsUphill);
         assert!(fallen.heights.iter().zip(&ground).all(|(height, ground)| *height == ground.unwrap()));
+    }
+
+    #[test]
+    fn a_river_that_leaves_a_lake_through_its_rim_leaves_it() {
+        // A lake up to 40 m east at 60 m, a rim of 80 m, and a valley beyond; the first line ends on the rim.
+        let mut sources = vec![stream(1, &[(10.0, 10.0), (43.0, 10.0)]), stream(2, &[(43.0, 10.0), (90.0, 10.0)])];
+        sources.iter_mut().for_each(|source| source.id.numbering = Numbering::Row);
+        let ground = |east: f64| match east {
+            ..=40.0 => 60.0,
+            ..46.0 => 80.0,
+            _ => 55.0 - (east - 46.0) / 4.0,
+        };
+        let (network, ground, _) = network(sources, |east, _| ground(east));
+        let east = |node: &crate::network::Node| network.lattice.posts_of(node.place)[0];
+        let lake: Vec<Option<i32>> =
+            network.nodes.iter().map(|node| (east(node) <= 40.0).then_some(60 * 128)).collect();
+        let (fallen, _) = check(&network, &ground, &lake);
+        assert!(fallen.turned.iter().all(|turned| !turned));
+        assert!(fallen.heights.iter().all(|height| *height <= 60 * 128), "it climbs out of the lake");
     }
 
     #[test]

@@ -70,6 +70,11 @@ pub enum AreaShape {
         /// Radius in millimetres over which slopes are averaged first.
         smooth_mm: u32,
     },
+    /// Posts where the ground lies level at one height, as the sea does.
+    Level {
+        /// The height in millimetres.
+        height_mm: i32,
+    },
     /// Posts of a class of the sample terrain (only with [`crate::DemSource::Sample`]).
     Sample(SampleClass),
 }

@@ -255,7 +255,8 @@ const IMPORTANCE: &[Key] = &[
     Key::new("areas", "areas with a weight of their own, later ones over earlier ones")
         .bounded(|| {
             let kinds = "each { file = … } or { raster = …, value = … } or { sample = … }";
-            format!("a list of at most {AREAS_MAX} areas, {kinds} or {{ slope_above_percent = … }}")
+            let of_heights = "or { slope_above_percent = … } or { level_m = … }";
+            format!("a list of at most {AREAS_MAX} areas, {kinds} {of_heights}")
         })
         .otherwise("all ground matters the same")
         .example("areas = [{ file = \"mountains.geojson\", class = \"mountains\", weight = 1 }]"),
@@ -264,29 +265,33 @@ const IMPORTANCE: &[Key] = &[
 
 const RASTER_EXAMPLE: &str = "{ raster = \"class.tif\", value = 3, class = \"mountains\", weight = 1 }";
 const SLOPE_EXAMPLE: &str = "{ slope_above_percent = 20, smooth_m = 500, class = \"mountains\", weight = 1 }";
-const ONE_OF_FOUR: &str = "file, raster, slope_above_percent or sample says which ground";
+const ONE_OF_FIVE: &str = "file, raster, slope_above_percent, level_m or sample says which ground";
 
 const AREAS: &[Key] = &[
     Key::new("file", "polygons that hold it")
         .form("the path of a file")
-        .otherwise(ONE_OF_FOUR)
+        .otherwise(ONE_OF_FIVE)
         .example("{ file = \"mountains.geojson\", class = \"mountains\", weight = 1 }"),
-    Key::new("raster", "a raster of classes").form("the path of a file").otherwise(ONE_OF_FOUR).example(RASTER_EXAMPLE),
+    Key::new("raster", "a raster of classes").form("the path of a file").otherwise(ONE_OF_FIVE).example(RASTER_EXAMPLE),
     Key::new("value", "its class there")
         .form("the value of the class in the raster, a whole number")
         .otherwise("needed with raster")
         .example(RASTER_EXAMPLE),
     Key::new("slope_above_percent", "ground steeper than this")
         .bounded(|| format!("a slope in percent, above 0 and at most {SLOPE_PERCENT_MAX}, in whole thousandths"))
-        .otherwise(ONE_OF_FOUR)
+        .otherwise(ONE_OF_FIVE)
         .example(SLOPE_EXAMPLE),
     Key::new("smooth_m", "radius over which slopes are averaged first")
         .number("metres", 0.0..=SMOOTH_M_MAX)
         .otherwise("needed with slope_above_percent")
         .example(SLOPE_EXAMPLE),
+    Key::new("level_m", "ground that lies level at this height over 5 x 5 posts or more, as the sea does")
+        .number("a height in metres", -LEVEL_M_MAX..=LEVEL_M_MAX)
+        .otherwise(ONE_OF_FIVE)
+        .example("{ level_m = 0, class = \"water\", weight = 1 }"),
     Key::new("sample", "ground of the built-in terrain")
         .words::<SampleClass>()
-        .otherwise(ONE_OF_FOUR)
+        .otherwise(ONE_OF_FIVE)
         .example("{ sample = \"mountains\", class = \"mountains\", weight = 1 }"),
     Key::new("class", "its class, which triangles carry")
         .line(CLASS, NAME_CHARS_MAX)

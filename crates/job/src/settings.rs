@@ -159,6 +159,7 @@ impl Job {
                 let [above, smooth_m] = [above, smooth_mm].map(|thousandths| number(f64::from(*thousandths) / 1000.0));
                 format!("slope_above_percent = {above}, smooth_m = {smooth_m}")
             }
+            AreaShape::Level { height_mm } => format!("level_m = {}", number(f64::from(*height_mm) / 1000.0)),
             AreaShape::Sample(class) => format!("sample = {}", quoted(class.name())),
         };
         let class = quoted(&self.importance.classes[usize::from(area.class)]);

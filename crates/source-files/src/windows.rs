@@ -108,6 +108,27 @@ impl DemFile {
         Ok(look)
     }
 
+    /// How many posts are exactly 0 m high as so many beside them in a row, as those of the sea are in most rasters.
+    ///
+    /// # Errors
+    /// As [`DemFile::decode`] and [`DemFile::assemble`].
+    pub fn posts_at_sea_level(&self) -> Result<usize, SourceError> {
+        /// A plain of whole metres has shorter rows of posts at 0 m.
+        const RUN_MIN: usize = 32;
+        let (mut found, mut kept, mut row_m) = (0, None, Vec::new());
+        for chunk in self.chunks_of(self.rect()) {
+            let PostRect { south, west, north, east } = self.posts_of(chunk);
+            let raster = self.assemble(self.posts_of(chunk), vec![self.decode_one(chunk, &mut kept)?])?;
+            for row in south..=north {
+                row_m.clear();
+                raster.push_row_m(row, west..east + 1, &mut row_m);
+                let runs = row_m.chunk_by(|a, b| (*a == 0.0) == (*b == 0.0));
+                found += runs.filter(|run| run[0] == 0.0 && RUN_MIN <= run.len()).map(<[f64]>::len).sum::<usize>();
+            }
+        }
+        Ok(found)
+    }
+
     /// The name of the samples' type, where it is one of fractions.
     pub(crate) fn fractional(&self) -> Option<&'static str> {
         match self.header().kind {

@@ -43,9 +43,12 @@ pub enum CostUnit {
     Points,
 }
 
-/// The gains of one tile, in the order in which it would take them.
+/// The gains of one tile, pins first, then in the order in which it would take them.
 pub fn survey(dem: &Dem, importance: &Importance, task: &SurveyTask, level: Level) -> GainCurve {
     let mut recorder = Recorder::new(task);
+    // Pins are there whatever they gain: the budget is for them first.
+    let pinned = task.growth.start.iter().filter(|start| start.pinned && task.growth.is_charged(start.at));
+    pinned.for_each(|start| recorder.selected(LocalPost::of(start.at, task.growth.rect), f64::MAX));
     let start = Start::new(&task.growth);
     let _ = dispatch!(level, simd => grow(simd, dem, importance, &task.growth, start, &mut recorder));
     if task.counts_left {

@@ -44,8 +44,11 @@ pub fn idle_areas(
         let found = match &spec.shape {
             AreaShape::Polygons { file } => looked.polygons(file)?,
             AreaShape::RasterValue { file, value } => looked.raster(file, *value)?,
+            AreaShape::Level { .. } if !is_shared => {
+                Some("matches nothing: nowhere in the area are 5 x 5 posts or more at that height".to_owned())
+            }
             // Ground may well be nowhere steep.
-            AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
+            AreaShape::Slope { .. } | AreaShape::Level { .. } | AreaShape::Sample(_) => None,
         };
         idle.extend(found.map(|found| format!("importance.areas[{index}] {found}")));
     }

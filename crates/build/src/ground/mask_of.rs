@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use job::{AreaShape, DemSource, ImportanceArea, ImportanceSpec, Job, WaterSpec};
 use source_files::{ClassRaster, read_polygons};
-use terrain::THOUSANDTHS;
 use terrain::mask::{Mask, Polygon, Shape};
+use terrain::{Dem, PostRect, THOUSANDTHS};
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
@@ -104,7 +104,17 @@ impl Opening<'_> {
                     })
                 }))
             }
-            AreaShape::Slope { above, smooth_mm } => self.steep(*above, *smooth_mm),
+            AreaShape::Slope { above, smooth_mm } => {
+                let (above, spacing) = (*above, frame.spacing);
+                let radius = (f64::from(*smooth_mm) / 1000.0 / spacing.metres()).round() as i32;
+                self.of_heights(terrain::mask::steep_halo(radius), move |dem, rect| {
+                    terrain::mask::steep(dem, rect, spacing, radius, above)
+                })
+            }
+            AreaShape::Level { height_mm } => {
+                let height = terrain::quanta_of_metres(f64::from(*height_mm) / 1000.0).expect("the key bounds it");
+                self.of_heights(terrain::mask::LEVEL_HALO, move |dem, rect| terrain::mask::level(dem, rect, height))
+            }
             AreaShape::Sample(job::SampleClass::Mountains) => {
                 let seed = match &self.job.dem.source {
                     DemSource::Sample { seed } => *seed,
@@ -118,16 +128,17 @@ impl Opening<'_> {
         })
     }
 
-    /// Ground steeper than so much. Each window is decided from the heights around it, so two tiles agree on a seam.
-    fn steep(&self, above: u32, smooth_mm: u32) -> Shape<'static> {
+    /// Ground that its heights say of. Each window is decided from those around it, so two tiles agree on a seam.
+    fn of_heights(
+        &self,
+        halo: i32,
+        members: impl Fn(&Dem, PostRect) -> Vec<bool> + Send + Sync + 'static,
+    ) -> Shape<'static> {
         let (relief, fault, area) = (self.relief.clone(), self.fault.clone(), self.area.rect);
-        let spacing = self.area.frame.spacing;
-        let radius = (f64::from(smooth_mm) / 1000.0 / spacing.metres()).round() as i32;
         Shape::Members(Box::new(move |rect| {
-            let around =
-                rect.grown(terrain::mask::steep_halo(radius)).intersection(&area).expect("a window lies in the area");
+            let around = rect.grown(halo).intersection(&area).expect("a window lies in the area");
             match relief.dem(around) {
-                Ok(dem) => terrain::mask::steep(&dem, rect, spacing, radius, above),
+                Ok(dem) => members(&dem, rect),
                 Err(error) => {
                     fault.put(error);
                     vec![false; rect.post_count()]

@@ -61,7 +61,7 @@ fn named_files<'a>(job: &'a Job) -> Vec<Named<'a>> {
     });
     let areas = job.importance.areas.iter().filter_map(|area| match &area.shape {
         AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
-        AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
+        AreaShape::Slope { .. } | AreaShape::Level { .. } | AreaShape::Sample(_) => None,
     });
     let others = geoids.chain(water).chain(start).chain(&job.tin.pins).chain(areas);
     let named = |file: &'a NamedFile, is_features| Named {

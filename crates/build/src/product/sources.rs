@@ -62,7 +62,7 @@ pub fn locate_weights(job: &mut Job, manifest: &Manifest, folder: &Path) -> Resu
     job.tin.start = None;
     let named = job.importance.areas.iter_mut().filter_map(|area| match &mut area.shape {
         AreaShape::Polygons { file } | AreaShape::RasterValue { file, .. } => Some(file),
-        AreaShape::Slope { .. } | AreaShape::Sample(_) => None,
+        AreaShape::Slope { .. } | AreaShape::Level { .. } | AreaShape::Sample(_) => None,
     });
     locate(named.chain(job.tin.pins.as_mut()), manifest, folder)
 }

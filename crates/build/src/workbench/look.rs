@@ -35,6 +35,8 @@ pub struct Seen {
     pub undeclared: Option<f64>,
     /// Lowest and highest height in metres; `None` when all posts are void.
     pub range_m: Option<(f64, f64)>,
+    /// Posts of it that are exactly 0 m high as those around them, as the sea is.
+    pub at_sea_level: usize,
     /// What it says heights are measured from.
     pub vertical_datum: Option<String>,
     /// Vertical accuracy that it states, in metres.
@@ -316,6 +318,8 @@ fn look(path: &Path, given: Option<&str>) -> Result<(Seen, RasterFrame), Compile
     let (found, frame) = (found?, file.frame());
     let mut notes: Vec<String> = frame.crs.remark().map(str::to_owned).into_iter().collect();
     notes.extend(found.notes.iter().take(3).cloned());
+    let reaches_sea_level = found.range_m.is_some_and(|(low, high)| low <= 0.0 && 0.0 <= high);
+    let at_sea_level = if reaches_sea_level { file.posts_at_sea_level()? } else { 0 };
     let seen = Seen {
         path: frame.path.clone(),
         format: file.format(),
@@ -326,6 +330,7 @@ fn look(path: &Path, given: Option<&str>) -> Result<(Seen, RasterFrame), Compile
         voids: found.voids,
         undeclared,
         range_m: found.range_m,
+        at_sea_level,
         vertical_datum: file.vertical_datum().map(str::to_owned),
         accuracy_m: file.accuracy_m(),
         notes,

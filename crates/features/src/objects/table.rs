@@ -109,6 +109,7 @@ pub fn traits<'a>(
     let (kind, [usual_m, usual_width_m]) = kind_of(&tag);
     let kind = match said {
         Some(kind) => kind?,
+        None if lies_underground(&tag) => return None,
         None => source.0.or(kind)?,
     };
     let mut bad = Vec::new();
@@ -144,6 +145,14 @@ pub fn traits<'a>(
         fullness: fullness_of(kind, height_m),
     };
     Some((traits, bad))
+}
+
+/// Whether nothing of it stands above the ground: a car park under a square, a station.
+fn lies_underground<'a>(tag: impl Fn(&str) -> Option<&'a str>) -> bool {
+    let is_building = ["building", "building:part"].into_iter().filter_map(&tag).any(is_yes);
+    let is_below = |layer: &str| decimal(layer.trim()).is_some_and(|layer| layer < 0.0);
+    let is_said = tag("location") == Some("underground") || tag("is_underground") == Some("true");
+    is_building && (is_said || tag("layer").is_some_and(is_below))
 }
 
 fn is_yes(value: &str) -> bool {
@@ -233,6 +242,10 @@ mod tests {
         check(&[YES, ("height", "12.5 m"), ("building:levels", "2")], Some((Building, 0.0, 12.5, 0)));
         check(&[YES, ("building:levels", "4")], Some((Building, 0.0, 14.0, 0)));
         check(&[YES, ("height", "20"), ("min_height", "8")], Some((Building, 8.0, 20.0, 0)));
+        for below in [("layer", "-2"), ("location", "underground"), ("is_underground", "true")] {
+            check(&[YES, ("height", "20"), below], None);
+        }
+        check(&[YES, ("layer", "1")], Some((Building, 0.0, 6.0, 0)));
         check(&[("building:part", "roof"), ("building:min_level", "2")], Some((Building, 6.0, 10.0, 0)));
         check(&[("man_made", "chimney"), ("height", "100")], Some((Tower, 0.0, 100.0, 0)));
         check(&[("man_made", "bridge")], None);

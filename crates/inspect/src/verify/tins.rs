@@ -160,8 +160,7 @@ fn differing_parts(area: &GamingArea, tile: TileId, tin: &TileTin, modules: &Mod
     for module in area.tiling.modules(tile, area.grid).iter().filter_map(|id| modules.get(&id)) {
         let mut part = parts.remove(&module.id).unwrap_or_default();
         part.sort_unstable();
-        let corners = |triangle: &[u16; 3]| triangle.map(|corner| module.vertices[usize::from(corner)]);
-        if !module.triangles.iter().map(corners).eq(part) {
+        if !is_part(module, &part) {
             problems.push(format!(
                 "load module {}: its triangles are not those of its tile's TIN, tiles/{tile}.tin",
                 module.id
@@ -169,6 +168,54 @@ fn differing_parts(area: &GamingArea, tile: TileId, tin: &TileTin, modules: &Mod
         }
     }
     problems
+}
+
+/// Whether a load module has the triangles of its tile's TIN; in place of those that stand above a deck others may be,
+/// with vertices on it, that have the same outline.
+fn is_part(module: &LoadModule, part: &[[ModuleVertex; 3]]) -> bool {
+    let corners = |triangle: &[u16; 3]| triangle.map(|corner| module.vertices[usize::from(corner)]);
+    let own: Vec<[ModuleVertex; 3]> = module.triangles.iter().map(corners).collect();
+    let without = |all: &[[ModuleVertex; 3]], others: &[[ModuleVertex; 3]]| -> Vec<[ModuleVertex; 3]> {
+        all.iter().filter(|triangle| others.binary_search(triangle).is_err()).copied().collect()
+    };
+    let (gone, added) = (without(part, &own), without(&own, part));
+    let decks: Vec<[ModuleVertex; 3]> = module
+        .decks
+        .triangles
+        .iter()
+        .map(|deck| deck.map(|corner| module.decks.vertices[usize::from(corner)]))
+        .collect();
+    let is_lowered = |vertex: &ModuleVertex| {
+        let above =
+            |of: &[ModuleVertex; 3]| height_at(of, *vertex).is_some_and(|height| f64::from(vertex.z) <= height + 1.0);
+        gone.iter().any(above) && decks.iter().any(|deck| height_at(deck, *vertex).is_some())
+    };
+    let was_there = |vertex: &ModuleVertex| gone.iter().flatten().any(|other| other == vertex);
+    outline(&gone) == outline(&added) && added.iter().flatten().all(|vertex| was_there(vertex) || is_lowered(vertex))
+}
+
+/// The edges that triangles have on one side only, from corner to corner.
+fn outline(triangles: &[[ModuleVertex; 3]]) -> BTreeSet<[ModuleVertex; 2]> {
+    let edges: BTreeSet<[ModuleVertex; 2]> = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
+    edges.iter().copied().filter(|&[from, to]| !edges.contains(&[to, from])).collect()
+}
+
+/// The height of a triangle at a place; `None` beside it.
+fn height_at(triangle: &[ModuleVertex; 3], place: ModuleVertex) -> Option<f64> {
+    /// Quanta beside an edge at which a place that was rounded counts as on it.
+    const ROUNDED: f64 = 1.5;
+    let along = |from: ModuleVertex, to: ModuleVertex| {
+        [[from.x, to.x], [from.y, to.y]].map(|[from, to]| f64::from(to) - f64::from(from))
+    };
+    let [a, b, c] = *triangle;
+    let part = |[from, to]: [ModuleVertex; 2]| {
+        let (edge, beside) = (along(from, to), along(from, place));
+        let doubled = edge[0] * beside[1] - edge[1] * beside[0];
+        (-ROUNDED * edge[0].hypot(edge[1]) <= doubled).then_some(doubled)
+    };
+    let [Some(of_a), Some(of_b), Some(of_c)] = [[b, c], [c, a], [a, b]].map(part) else { return None };
+    let sum = of_a * f64::from(a.z) + of_b * f64::from(b.z) + of_c * f64::from(c.z);
+    Some(sum / (of_a + of_b + of_c))
 }
 
 fn parts_of(area: &GamingArea, tin: &TileTin) -> Result<Parts, String> {

@@ -54,9 +54,15 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
     let (file, raster) = (table.optional("file"), table.optional("raster"));
     let (value, sample) = (table.optional("value"), table.optional("sample"));
     if let Some(above) = table.optional("slope_above_percent") {
-        return match file.or(raster).or(sample).or(value) {
+        return match file.or(raster).or(sample).or(value).or(table.optional("level_m")) {
             None => slope(&above, table),
             Some(other) => Err(other.conflict("slope_above_percent", "one of the two", "remove one of the two")),
+        };
+    }
+    if let Some(level) = table.optional("level_m") {
+        return match file.or(raster).or(sample).or(value) {
+            None => Ok(AreaShape::Level { height_mm: (level.number()? * 1000.0).round() as i32 }),
+            Some(other) => Err(other.conflict("level_m", "one of the two", "remove one of the two")),
         };
     }
     if let Some(smooth) = table.optional("smooth_m") {
@@ -75,7 +81,7 @@ fn shape(item: &Entry, table: &Section, dem: &DemSource, job: &Path) -> Result<A
         (None, None, Some(sample)) => sample_class(&sample, dem),
         _ => Err(JobError::Conflict(item.fault(
             "exactly one of file = \"x.geojson\", raster = \"x.tif\" with value, sample = \"mountains\", \
-             slope_above_percent = 20",
+             slope_above_percent = 20, level_m = 0",
         ))),
     }
 }

@@ -8,7 +8,7 @@ pub(super) const ATTRIBUTION: &str = "(c) OpenStreetMap contributors, Overture M
 /// Columns that all of its types have, and together hardly anything else.
 pub(super) const MARKS: [&str; 5] = ["id", "geometry", "bbox", "version", "sources"];
 /// Columns of one text or number that are looked at.
-pub(super) const PLAIN: [&str; 12] = [
+pub(super) const PLAIN: [&str; 13] = [
     "id",
     "subtype",
     "class",
@@ -20,6 +20,7 @@ pub(super) const PLAIN: [&str; 12] = [
     "building_id",
     "has_parts",
     "is_intermittent",
+    "is_underground",
     "surface",
 ];
 /// Columns of rules, each of which holds between two places of a segment: the column, and the key of its values;
@@ -89,12 +90,13 @@ const TABLE: [(Values, Values, Form, &str, &str); 28] = [
     ),
 ];
 
-/// Numbers of buildings and their parts.
-const NUMBERS: [(&str, &str); 4] = [
+/// Numbers of buildings and their parts, and whether they lie below the ground.
+const NUMBERS: [(&str, &str); 5] = [
     ("height", "height"),
     ("num_floors", "building:levels"),
     ("min_height", "min_height"),
     ("min_floor", "building:min_level"),
+    ("is_underground", "is_underground"),
 ];
 
 /// Flags, and the tags that they stand for; `highway` stands for the key of the class, too.

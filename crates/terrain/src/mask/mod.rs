@@ -132,11 +132,44 @@ fn claims(mask: &Mask, frame: &GridFrame, rect: PostRect) -> Claims {
     claims
 }
 
-fn cut(classes: &[u8], from: PostRect, rect: PostRect) -> Vec<u8> {
+fn cut<T: Copy>(values: &[T], from: PostRect, rect: PostRect) -> Vec<T> {
     let west = (rect.west - from.west) as usize;
     let south = (rect.south - from.south) as usize;
-    let rows = classes.chunks(from.posts_wide()).skip(south).take(rect.posts_high());
+    let rows = values.chunks(from.posts_wide()).skip(south).take(rect.posts_high());
     rows.flat_map(|row| row[west..west + rect.posts_wide()].iter().copied()).collect()
+}
+
+/// Posts along a side of the squares that level ground is made of.
+const LEVEL_SIDE: usize = 5;
+/// Posts around a window whose heights decide which of its posts are level.
+pub const LEVEL_HALO: i32 = LEVEL_SIDE as i32 - 1;
+
+/// Which posts of `rect`, row-major, lie in squares of 5 x 5 posts all of which are `height` quanta high, as the sea is
+/// in most rasters. `dem` holds [`LEVEL_HALO`] posts around `rect`, as far as the area goes.
+///
+/// # Panics
+/// When `dem` does not hold `rect`.
+pub fn level(dem: &Dem, rect: PostRect, height: i32) -> Vec<bool> {
+    assert!(dem.rect().contains_rect(&rect), "a window holds the posts asked for");
+    let around = rect.grown(LEVEL_HALO).intersection(&dem.rect()).expect("a window holds the posts asked for");
+    let wide = around.posts_wide();
+    let mut in_squares = vec![false; around.post_count()];
+    // For each column, rows on end, this one the last, in which so many level posts end there.
+    let mut rows = vec![0; wide];
+    for (row, posts) in (around.south..=around.north).enumerate() {
+        let mut run = 0;
+        for (col, rows) in rows.iter_mut().enumerate() {
+            let post = Post::new(posts, around.west + col as i32);
+            run = if !dem.is_void(post) && dem.height(post) == height { run + 1 } else { 0 };
+            *rows = if LEVEL_SIDE <= run { *rows + 1 } else { 0 };
+            if LEVEL_SIDE <= *rows {
+                for row in row + 1 - LEVEL_SIDE..=row {
+                    in_squares[row * wide + col + 1 - LEVEL_SIDE..=row * wide + col].fill(true);
+                }
+            }
+        }
+    }
+    cut(&in_squares, around, rect)
 }
 
 /// Slopes beyond this, in thousandths of a percent, count as this: sums over a square stay far inside 64 bits.

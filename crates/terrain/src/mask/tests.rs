@@ -201,3 +201,27 @@ fn areas_over_all_others_end_sharply_and_soften_nothing() {
         assert_eq!((laid.weight(post), laid.class(post)), expected, "{post:?}");
     }
 }
+
+#[test]
+fn level_ground_is_made_of_squares_and_every_window_finds_the_same() {
+    let rect = PostRect::of_size(40, 30);
+    let sea = |post: Post| (3..20).contains(&post.row) && (2..=8).contains(&post.col);
+    // A strip of 4 posts beside it, a hole, and a place that is lower.
+    let strip = |post: Post| (20..24).contains(&post.row) && 12 < post.col;
+    let other = |post: Post| post == Post::new(5, 3) || post == Post::new(12, 8);
+    let height = |post: Post| match (sea(post) || strip(post), post == Post::new(5, 3)) {
+        (true, true) => None,
+        (true, false) => Some(if other(post) { -1 } else { 0 }),
+        (false, _) => Some(1),
+    };
+    let dem = Dem::from_fn(rect, height);
+    let square = |south: i32, west: i32| PostRect { south, west, north: south + 4, east: west + 4 };
+    let squares = rect.posts().map(|post| square(post.row, post.col)).filter(|of| rect.contains_rect(of));
+    let whole: Vec<PostRect> =
+        squares.filter(|of| of.posts().all(|post| !dem.is_void(post) && dem.height(post) == 0)).collect();
+    assert!(!whole.is_empty());
+    for window in [rect, PostRect { south: 2, west: 4, north: 13, east: 9 }, PostRect { south: 20, ..rect }] {
+        let expected: Vec<bool> = window.posts().map(|post| whole.iter().any(|of| of.contains(post))).collect();
+        assert_eq!(level(&dem, window, 0), expected, "{window:?}");
+    }
+}

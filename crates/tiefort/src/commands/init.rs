@@ -341,6 +341,7 @@ fn job_text(
     text += "]\n";
     text += &voids_text(suggestion);
     text += &datum_text(seen);
+    text += &sea_section(seen);
     text += &features_section(features, folder);
     text += &objects_section(features, &limits.objects, folder);
     text += &format!(
@@ -431,6 +432,25 @@ fn voids_text(Suggestion { seen, gap_posts, .. }: &Suggestion) -> String {
         ),
         false => "voids = \"fail\"                # there are none\n".to_owned(),
     }
+}
+
+/// The section `[importance]`, where a part of the files is the sea; empty where none is.
+fn sea_section(seen: &[Seen]) -> String {
+    /// Less of the posts than that may be a field that lies level.
+    const SHARE_MIN: f64 = 0.01;
+    let posts: f64 = seen.iter().map(|file| f64::from(file.size.0) * f64::from(file.size.1)).sum();
+    let share = seen.iter().map(|file| file.at_sea_level).sum::<usize>() as f64 / posts;
+    // Brought to another datum, the sea lies at no one height.
+    if share < SHARE_MIN || 1 < known_datums(seen).len() {
+        return String::new();
+    }
+    format!(
+        "\n[importance]\n\
+         # The sea: {:.0} % of the posts lie level at 0 m. A file of its polygon with\n\
+         # kind = \"lake\" in [features] has a sharper shore.\n\
+         areas = [{{ level_m = 0, class = \"water\", weight = 1 }}]\n",
+        share * 100.0
+    )
 }
 
 /// The vertical datum, where the files agree on one.

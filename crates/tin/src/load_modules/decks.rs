@@ -7,8 +7,8 @@ use terrain::{Decks, FeatureSurface, LatticePoint, ModuleVertex, Vertex};
 use crate::load_modules::Layout;
 use crate::load_modules::stand::is_inside;
 
-/// Triangles that lifting may add in a load module at most: six corners, each of two.
-pub const SPARE_MAX: usize = 12;
+/// Triangles that lifting, and lowering the ground, may add in a load module at most: twelve corners, each of two.
+pub const SPARE_MAX: usize = 24;
 
 /// Quanta north and east together from which an edge has a corner in its middle: 4 m.
 const MIDDLE_MIN: i64 = 4 * 128;

@@ -387,15 +387,15 @@ fn place(vertex: ModuleVertex) -> [u16; 2] {
     [vertex.x, vertex.y]
 }
 
-fn at(vertex: ModuleVertex) -> [f64; 2] {
+pub(super) fn at(vertex: ModuleVertex) -> [f64; 2] {
     place(vertex).map(f64::from)
 }
 
-fn apart(one: [f64; 2], other: [f64; 2]) -> f64 {
+pub(super) fn apart(one: [f64; 2], other: [f64; 2]) -> f64 {
     (other[0] - one[0]).hypot(other[1] - one[1])
 }
 
-fn dot(one: [f64; 3], other: [f64; 3]) -> f64 {
+pub(super) fn dot(one: [f64; 3], other: [f64; 3]) -> f64 {
     (0..3).map(|at| one[at] * other[at]).sum()
 }
 
@@ -418,14 +418,14 @@ fn missing_between([one, other]: [[f64; 2]; 2], side: &[[f64; 2]]) -> f64 {
 }
 
 /// West, east, south and north of a triangle.
-fn bounds(triangle: &[u16; 3], vertices: &[ModuleVertex]) -> [u16; 4] {
+pub(super) fn bounds(triangle: &[u16; 3], vertices: &[ModuleVertex]) -> [u16; 4] {
     let [a, b, c] = triangle.map(|corner| vertices[usize::from(corner)]);
     let [west, south] = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y)];
     [west, a.x.max(b.x).max(c.x), south, a.y.max(b.y).max(c.y)]
 }
 
 /// What each corner of a triangle makes up of the height at a place.
-fn weights(triangle: [ModuleVertex; 3], place: [f64; 2]) -> [f64; 3] {
+pub(super) fn weights(triangle: [ModuleVertex; 3], place: [f64; 2]) -> [f64; 3] {
     let [a, b, c] = triangle.map(at);
     let whole = cross(a, b, c);
     let [of_b, of_c] = [cross(place, c, a) / whole, cross(a, b, place) / whole];
@@ -433,7 +433,7 @@ fn weights(triangle: [ModuleVertex; 3], place: [f64; 2]) -> [f64; 3] {
 }
 
 /// The corners of what two triangles have in common.
-fn common(deck: [ModuleVertex; 3], ground: [ModuleVertex; 3]) -> Vec<[f64; 2]> {
+pub(super) fn common(deck: [ModuleVertex; 3], ground: [ModuleVertex; 3]) -> Vec<[f64; 2]> {
     let mut shape = deck.map(at).to_vec();
     let ground = ground.map(at);
     for side in 0..3 {
@@ -459,7 +459,7 @@ fn left_of(shape: &[[f64; 2]], [from, to]: [[f64; 2]; 2]) -> Vec<[f64; 2]> {
     kept
 }
 
-fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
+pub(super) fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
     (to[0] - from[0]) * (at[1] - from[1]) - (to[1] - from[1]) * (at[0] - from[0])
 }
 

@@ -14,6 +14,8 @@ mod classes;
 mod concatenate;
 mod decks;
 pub use decks::{SPARE_MAX, cut_decks};
+mod clear;
+pub use clear::clear_decks;
 mod lift;
 pub use lift::lift_decks;
 mod lines;
