@@ -69,6 +69,8 @@ pub(crate) struct Face {
     pub color: [u8; 3],
     /// Whether it is drawn from both sides.
     pub is_seen_from_below: bool,
+    /// Whether vehicles stand on it: ground, ways and decks.
+    pub is_terrain: bool,
     /// Whether it is seen with the texture of the file.
     pub has_texture: bool,
 }
@@ -263,7 +265,8 @@ impl Records {
     /// across and along a way, for a texture of the first layer above that of the file.
     pub(crate) fn face(&mut self, triangle: [u32; 3], face: Face, lane: Option<[[f32; 2]; 3]>) {
         const FIRST_LAYER: u32 = 0x8000_0000;
-        const TERRAIN_PACKED_COLOUR: u32 = 0x8000_0000 | 0x2000_0000 | 0x1000_0000;
+        const TERRAIN: u32 = 0x8000_0000;
+        const PACKED_COLOUR: u32 = 0x2000_0000 | 0x1000_0000;
         const FACE_COLOUR_WITH_NORMALS: u8 = 2;
         let [red, green, blue] = face.color.map(u32::from);
         self.open(opcode::FACE, 80);
@@ -274,7 +277,7 @@ impl Records {
         // No texture of details.
         self.i16s(&[-1, i16::from(face.has_texture) - 1, face.material, surface, feature]);
         self.zeros(4 + 2 + 2);
-        self.u32s(&[TERRAIN_PACKED_COLOUR]);
+        self.u32s(&[PACKED_COLOUR | if face.is_terrain { TERRAIN } else { 0 }]);
         self.put(&[FACE_COLOUR_WITH_NORMALS]);
         self.zeros(7);
         self.u32s(&[0xff00_0000 | blue << 16 | green << 8 | red, 0]);
@@ -332,7 +335,14 @@ mod tests {
         all.push();
         all.group("a");
         all.object("r0001c0002");
-        let face = Face { codes: [3, 0], material: 0, color: [1, 2, 3], is_seen_from_below: true, has_texture: false };
+        let face = Face {
+            codes: [3, 0],
+            material: 0,
+            color: [1, 2, 3],
+            is_seen_from_below: true,
+            is_terrain: true,
+            has_texture: false,
+        };
         all.level("lod1", [2000.0, 9000.0], [500.0, 250.0, 1000.0]);
         all.face([0, 1, 2], face, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 7.0]]));
         all.external("squares/r00c00.flt");

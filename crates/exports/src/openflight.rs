@@ -5,6 +5,7 @@
 //! in their square. Where load modules have coarser levels, a square has a level-of-detail node for each, which
 //! programs show by their distance. Places across and along ways are lists of the first layer above the texture.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use terrain::{ModuleId, ModuleRect, metres_of_quanta};
@@ -69,8 +70,9 @@ fn put_square(records: &mut Records, details: &[Detail], rect: ModuleRect, textu
     let mut materials: Vec<Material> = details.iter().flat_map(|detail| detail.mesh.groups()).collect();
     materials.sort_unstable();
     materials.dedup();
-    for (index, material) in materials.iter().enumerate() {
-        records.material(index as i32, &material.word(details[0].product.classes()));
+    let names = materials.iter().map(|material| material.word(details[0].product.classes()));
+    for (index, name) in short_names(names).iter().enumerate() {
+        records.material(index as i32, name);
     }
     let levels: Vec<Vec<(Sheet, Part)>> = details.iter().map(|detail| sheets(detail, rect)).collect();
     let of_level = |(detail, parts): (&Detail, &Vec<(Sheet, Part)>)| -> Vec<FltVertex> {
@@ -106,6 +108,27 @@ fn put_square(records: &mut Records, details: &[Detail], rect: ModuleRect, textu
         }
     }
     records.pop();
+}
+
+/// Letters of a name in the palette of materials.
+const NAME_LETTERS: usize = 11;
+
+/// Names as a palette has room for them: where unlike names begin with the same letters, all but the first of them end
+/// in a number.
+fn short_names(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut known: BTreeMap<String, String> = BTreeMap::new();
+    let mut short = |name: String| {
+        let cut = |letters: usize| name.chars().take(letters).collect::<String>();
+        if let Some(known) = known.get(&name) {
+            return known.clone();
+        }
+        let numbered = (2..).map(|number| format!("~{number}")).map(|end| cut(NAME_LETTERS - end.len()) + &end);
+        let is_free = |short: &String| known.values().all(|taken| taken != short);
+        let found = std::iter::once(cut(NAME_LETTERS)).chain(numbered).find(is_free).unwrap_or_default();
+        known.insert(name, found.clone());
+        found
+    };
+    names.map(|name| short(name)).collect()
 }
 
 /// What a level has in a square: the group of the ground is there in any case, with an object for each load module.
@@ -151,7 +174,8 @@ fn put_objects(
             let color = if has_texture { [255; 3] } else { material.color(detail.product.classes()) };
             let codes = material.codes(detail.product.classes());
             let material = materials.iter().position(|of| *of == material).map_or(-1, |place| place as i16);
-            let face = Face { codes, material, color, is_seen_from_below: sheet.is_seen_from_below(), has_texture };
+            let (is_seen_from_below, is_terrain) = (sheet.is_seen_from_below(), sheet != Sheet::Objects);
+            let face = Face { codes, material, color, is_seen_from_below, is_terrain, has_texture };
             records.face(triangle.map(|v| first + v), face, part.lane(*triangle));
         }
         records.pop();
@@ -280,10 +304,18 @@ fn files(grid: &Grid) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
     use crate::samples;
+
+    #[test]
+    fn unlike_names_stay_unlike_where_they_are_cut() {
+        let long = "concrete_reinforced";
+        let names = [long.to_owned(), format!("{long}_roof"), "minor".into(), format!("{long}_wall"), long.into()];
+        assert_eq!(
+            short_names(names.into_iter()),
+            ["concrete_re", "concrete_~2", "minor", "concrete_~3", "concrete_re"]
+        );
+    }
 
     #[test]
     fn an_area_is_a_file_per_square_one_that_refers_to_them_and_an_index() {

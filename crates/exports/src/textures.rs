@@ -157,6 +157,7 @@ impl Textures {
         for picture in &self.pictures {
             picture.draw_with(Care::Whole, &square, &self.keep, &mut pixels).map_err(of_source)?;
         }
+        repeat_edge(&mut pixels, side, texels);
         let opaque = |pixel: &[u8; 4]| {
             // Colours come multiplied with how opaque they are; the ground shows where none is.
             let rest = 255 - u32::from(pixel[3]);
@@ -177,6 +178,20 @@ impl Textures {
         let least = texel_m.max(self.texel_m).max(longest_m / (self.side_max - 2) as f64);
         // Rounded down, a module has fewer texels, each of them longer.
         if least <= module_m { module_m / (module_m / least + 1e-9).floor() } else { least }
+    }
+}
+
+/// Gives texels along the rim those beside them inside, where pictures end between both: what lies beyond is blended in
+/// along the border.
+fn repeat_edge(pixels: &mut [u8], side: usize, [wide, high]: [usize; 2]) {
+    let at = |x: usize, y: usize| 4 * (y * side + x);
+    let rows = (0..wide).flat_map(|x| [(x, 0), (x, high - 1)]);
+    let rim = rows.chain((0..high).flat_map(|y| [(0, y), (wide - 1, y)]));
+    for (x, y) in rim {
+        let (own, inside) = (at(x, y), at(x.clamp(1, wide - 2), y.clamp(1, high - 2)));
+        if pixels[own + 3] < pixels[inside + 3] {
+            pixels.copy_within(inside..inside + 4, own);
+        }
     }
 }
 
@@ -241,6 +256,20 @@ fn of_source(error: SourceError) -> ExportError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn texels_along_the_rim_repeat_those_beside_them_where_a_picture_ends() {
+        // Four by four texels of a square of five: the picture ends before the rim, but for one side.
+        let (side, of) = (5, |x: usize, y: usize| 4 * (y * 5 + x));
+        let mut pixels = vec![0; 4 * side * side];
+        for (x, y) in [(1, 1), (2, 1), (1, 2), (2, 2), (0, 2)] {
+            pixels[of(x, y)..][..4].copy_from_slice(&[10 * x as u8, 10 * y as u8, 0, 255]);
+        }
+        repeat_edge(&mut pixels, side, [4, 4]);
+        let found = [(0, 0), (3, 0), (1, 3), (0, 2)].map(|(x, y)| pixels[of(x, y)..][..4].to_vec());
+        assert_eq!(found, [[10, 10, 0, 255], [20, 10, 0, 255], [10, 20, 0, 255], [0, 20, 0, 255]]);
+        assert_eq!(pixels[of(4, 2) + 3], 0, "what lies beyond the texture stays");
+    }
 
     #[test]
     fn a_picture_of_sgi_has_its_colours_one_after_the_other_from_the_south() {

@@ -28,7 +28,7 @@ const OWNED_LIBRARIES: [(&str, &[&str]); 11] = [
     // Bodies of requests are read as what they should be, so that a large one takes no more room than its numbers.
     ("serde", &["terrain", "store", "fidelity", "inspect", "tiefort"]),
     ("bincode", &["store"]),
-    ("serde_json", &["store", "build", "inspect", "views", "exports", "tiefort"]),
+    ("serde_json", &["source-files", "store", "build", "inspect", "views", "exports", "tiefort"]),
     ("clap", &["tiefort"]),
     ("indicatif", &["tiefort"]),
     ("cpu-time", &["tiefort"]),

@@ -343,3 +343,18 @@ fn points_on_a_fixed_outer_border_count_in_the_limits() {
         assert!(19 <= count, "{count} of 19 points on the border are there");
     }
 }
+
+#[test]
+fn crowded_pins_leave_the_limits_whole_where_there_is_room_for_them() {
+    // In the first tile a pin on every third post of each third row; together a fifth of the triangles of the area.
+    let places = |side: i32| (1..side).step_by(3).flat_map(move |row| (1..side).step_by(3).map(move |col| (row, col)));
+    let pins: Vec<(&str, i32, i32, &str)> = places(3 * SIDE_CELLS).map(|(row, col)| ("add", row, col, "")).collect();
+    for tin in [CONSTRAINED, "effort = \"fast\"", "effort = \"normal\""] {
+        let scene = pinned(tin, &pins);
+        let report = scene.build("a.tdb", 2).report;
+        assert!(report.breaches.is_empty(), "{tin}: {:?}", report.breaches);
+        let at: BTreeSet<Post> = vertices(&scene, "a.tdb").into_iter().map(|(post, _)| post).collect();
+        assert!(pins.iter().all(|&(_, row, col, _)| at.contains(&Post::new(row, col))), "{tin}: a pin is gone");
+        scene.verify("a.tdb");
+    }
+}

@@ -160,7 +160,7 @@ fn differing_parts(area: &GamingArea, tile: TileId, tin: &TileTin, modules: &Mod
     for module in area.tiling.modules(tile, area.grid).iter().filter_map(|id| modules.get(&id)) {
         let mut part = parts.remove(&module.id).unwrap_or_default();
         part.sort_unstable();
-        if !is_part(module, &part) {
+        if !is_part(&module, &part) {
             problems.push(format!(
                 "load module {}: its triangles are not those of its tile's TIN, tiles/{tile}.tin",
                 module.id

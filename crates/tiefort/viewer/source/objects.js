@@ -58,6 +58,14 @@ export function metAt({ prisms, canopies }, x, y, radius, low, high) {
   };
 }
 
+/** The prism at a place of a roof or a wall. */
+export function prismAt(prisms, x, y, height) {
+  const near = 0.05;
+  const isThere = ({ box, floor, roof, rings }) => floor - near <= height && height <= roof + near
+    && reaches(box, x, y, near) && (isInside(rings, x, y) || rings.some((ring) => isNear(ring, x, y, near)));
+  return prisms.find(isThere) ?? null;
+}
+
 function isInside(rings, x, y) {
   let inside = false;
   for (const ring of rings) {

@@ -83,7 +83,7 @@ export function showPicked(area, picked) {
   box.style.display = picked ? "block" : "none";
   if (!picked) return;
   at("answer").style.display = "none";
-  const { row, col, level, place, triangle } = picked, figures = area.figures(row, col);
+  const { row, col, level, place, triangle, thing, above } = picked, figures = area.figures(row, col);
   const [east, north] = area.inSystem(place[0], place[1]);
   const metres = (value) => (Number.isNaN(value) ? "no post measured" : `${value.toFixed(2)} m`);
   const lines = [
@@ -93,7 +93,9 @@ export function showPicked(area, picked) {
     `residual RMS ${metres(figures.rms)}, largest ${metres(figures.largest)}`,
     `${east.toFixed(1)} E, ${north.toFixed(1)} N, ${place[2].toFixed(2)} m`,
   ];
-  if (triangle) {
+  if (thing) {
+    lines.push(`${thing}, ${above.toFixed(2)} m above the ground`);
+  } else if (triangle) {
     const slope = degrees(Math.acos(Math.min(triangle.normal[2], 1)));
     const kind = triangle.className === undefined ? "" : `, class ${triangle.className}`;
     if (level) lines.push(`drawn at level ${level}`);

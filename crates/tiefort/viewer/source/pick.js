@@ -2,24 +2,52 @@
 import {
   BufferGeometry, Float32BufferAttribute, LineBasicMaterial, LineLoop, Raycaster, Vector2,
 } from "three";
+import { prismAt } from "./objects.js";
 import { showPicked } from "./panel.js";
 
 const outlined = new LineBasicMaterial({ color: 0xff3d9a, depthTest: false });
 
-/** Where a ray through a point of the window meets the ground. */
+/** Where a ray through a point of the window meets the ground, a deck or a block that stands there. */
 export function hitAt({ camera, terrain }, x, y) {
   const rays = new Raycaster();
   rays.setFromCamera(new Vector2((2 * x) / innerWidth - 1, 1 - (2 * y) / innerHeight), camera);
-  const meshes = [...terrain.drawn.values()].map(({ mesh }) => mesh);
-  return rays.intersectObjects([...meshes, ...terrain.coarse.group.children], false)[0];
+  const blocks = terrain.showsObjects ? [...terrain.drawn.values()].map(({ stands }) => stands?.block) : [];
+  const meshes = [...terrain.drawn.values()].flatMap(({ mesh, decks }) => [mesh, decks]);
+  const all = [...meshes, ...blocks, ...terrain.coarse.group.children];
+  return rays.intersectObjects(all.filter(Boolean), false)[0];
 }
 
-/** Reads the triangle under the pointer, and outlines it. */
+/** A hit on a wall is met a hand's breadth before it. */
+const BEFORE_M = 0.1;
+
+/** The place of a hit, and how far it lies above the ground; `isWall` where nothing can stand on it. */
+export function placeOf({ terrain }, { point, face }) {
+  const isWall = Math.abs(face.normal.y) < 0.1, off = isWall ? BEFORE_M : 0;
+  const [east, north] = [point.x + off * face.normal.x, -point.z - off * face.normal.z];
+  return { east, north, isWall, above: terrain.aboveGround(east, north, point.y) };
+}
+
+/** What stands, or hangs, where a ray met no ground, in words; null where it met the ground. */
+function thingAt(terrain, { object, point }) {
+  const deckOf = object.userData.deckOf;
+  if (deckOf !== undefined) return "deck of a bridge";
+  const stands = [...terrain.drawn.values()].map((drawn) => drawn.stands).find((stands) => stands?.block === object);
+  if (!stands) return null;
+  const prism = prismAt(stands.prisms, point.x, -point.z, point.y);
+  return prism ? `${prism.kind}, ${(prism.roof - prism.floor).toFixed(1)} m high` : "building";
+}
+
+/** Reads the triangle under the pointer, and outlines it, or what stands there. */
 export function pick(view, x, y) {
   const { area, scene, terrain } = view, hit = hitAt(view, x, y);
   unpick(view);
   if (!hit) return;
   const place = [hit.point.x, -hit.point.z, hit.point.y], [row, col] = area.moduleAt(place[0], place[1]);
+  const thing = thingAt(terrain, hit);
+  if (thing) {
+    view.picked = { row, col, place, thing, above: placeOf(view, hit).above };
+    return showPicked(area, view.picked);
+  }
   const found = terrain.drawn.get(hit.object.userData.key);
   if (!found) return showPicked(area, { row, col, place });
   const { module, surface } = found, number = hit.faceIndex, positions = [];

@@ -35,8 +35,9 @@ export class Terrain {
     this.blocks = [];
     this.lacks = false;
     this.asked = new Set();
-    // What has come and is not drawn yet.
+    // What has come and is not drawn yet, the nearest to the observer first.
     this.came = [];
+    this.at = [0, 0];
     this.fault = null;
     // Change with what is drawn, and with what stands on it.
     this.version = this.stock = 0;
@@ -79,6 +80,7 @@ export class Terrain {
     this.coarse.follow(east, north);
     // The DEM has one level, and would not fit to coarser load modules.
     const levels = this.withDem ? 1 : this.area.levels;
+    this.at = this.area.moduleAt(east, north);
     const blocks = Array.from({ length: levels }, (_, level) =>
       this.blockAround(east, north, range * (1 + RING * level)));
     if (!this.lacks && String(blocks) === String(this.blocks)) return;
@@ -100,8 +102,15 @@ export class Terrain {
 
   loadMissing() {
     for (let level = 0; level < this.blocks.length; level++) {
-      for (const part of this.missing(level)) this.load(part, level);
+      const away = (part) => this.away(part);
+      for (const part of this.missing(level).sort((a, b) => away(a) - away(b))) this.load(part, level);
     }
+  }
+
+  /** How many load modules a rectangle of them lies from the observer. */
+  away([south, west, north, east]) {
+    const [row, col] = this.at;
+    return Math.hypot(Math.max(south - row, 0, row + 1 - north), Math.max(west - col, 0, col + 1 - east));
   }
 
   /** What stands for a load module on its way. */
@@ -141,7 +150,8 @@ export class Terrain {
       const modules = await readModules(this.area, part, level);
       if (this.withDem && level === 0) await readPosts(this.area, part, modules);
       if (this.area.has_lines) await readLines(this.area, part, modules);
-      this.came.push(...modules);
+      const away = ({ row, col }) => this.away([row, col, row + 1, col + 1]);
+      this.came = [...this.came, ...modules].sort((a, b) => away(a) - away(b));
       this.fault = null;
     } catch (fault) {
       // What was not loaded stays coarse; the page says so, and asks again.
@@ -168,6 +178,7 @@ export class Terrain {
     // The DEM knows no decks.
     const decks = module.decks && surface === module.tin ? deckMesh(this.area, module.decks) : null;
     if (decks) mesh.add(decks);
+    if (decks) decks.userData.deckOf = key;
     const roads = module.lines ? roadMesh(this.area, module.lines, surface) : null;
     if (roads) mesh.add(roads);
     const stands = module.objects ? this.stand(module.objects, surface) : null;
@@ -180,11 +191,11 @@ export class Terrain {
     const blocks = new Blocks();
     prisms.forEach((prism) => blocks.add(prism));
     const { meshes: leaves, pieces } = canopyMeshes(canopies, box, surface);
-    const meshes = [blocks.mesh(), ...leaves].filter(Boolean);
+    const block = blocks.mesh(), meshes = [block, ...leaves].filter(Boolean);
     meshes.forEach((each) => (each.visible = this.showsObjects));
     for (const { id } of [...prisms, ...canopies]) this.ids.set(id, (this.ids.get(id) ?? 0) + 1);
     this.stock += 1;
-    return { prisms, canopies, box, pieces, leaves, meshes };
+    return { prisms, canopies, box, pieces, leaves, meshes, block };
   }
 
   /** Objects of a load module go. */
@@ -320,6 +331,12 @@ export class Terrain {
     const deck = found.decks && deckUnder(found.module.decks, ...inside, ceiling);
     const isDeck = deck !== null && triangle.height <= deck.height;
     return { ...found, ...(isDeck ? deck : triangle), isDeck };
+  }
+
+  /** How high a place lies above the ground, however many decks are between. */
+  aboveGround(east, north, height) {
+    const ground = this.under(east, north, -Infinity);
+    return ground ? Math.max(height - ground.height, 0) : 0;
   }
 
   count(module) {

@@ -6,7 +6,7 @@ import { linkOf } from "./link.js";
 import { Marks } from "./marks.js";
 import { setOverlay } from "./materials.js";
 import { at, tell } from "./panel.js";
-import { hitAt } from "./pick.js";
+import { hitAt, placeOf } from "./pick.js";
 import { recorder, savePicture } from "./shot.js";
 
 const FREE = [0.35, 1, 0.45], HIDDEN = [1, 0.25, 0.2], LINE = [1, 0.88, 0.3];
@@ -79,21 +79,23 @@ export class Tools {
     if (!this.mode) return false;
     const hit = hitAt(this.view, x, y);
     if (!hit) return true;
-    const place = this.view.area.inSystem(hit.point.x, -hit.point.z);
+    const { east, north, above, isWall } = placeOf(this.view, hit), place = this.view.area.inSystem(east, north);
+    const end = { place, above, isWall };
     if (!this.first) {
-      this.first = place;
+      this.first = end;
       this.marks.draw([[[...place, hit.point.y], [...place, hit.point.y + 30], LINE]]);
       return true;
     }
     const [from, mode] = [this.first, this.mode];
     this.first = null;
-    this.tried(() => (mode === "sight" ? this.sight(from, place) : this.measure(from, place)));
+    this.tried(() => (mode === "sight" ? this.sight(from, end) : this.measure(from.place, place)));
     return true;
   }
 
+  /** Whether one end sees another: each stands on what was clicked, or is the place of a wall itself. */
   async sight(from, to) {
-    const [eye, target] = [Number(at("eye").value), Number(at("target").value)];
-    const found = await askSight([...from, eye], [...to, target], looking());
+    const end = ({ place, above, isWall }, height) => [...place, isWall ? above : above + Number(at(height).value)];
+    const found = await askSight(end(from, "eye"), end(to, "target"), looking());
     if (found.visible === null) throw new Error("the line leaves the area");
     const { visible, blocker, ends, hidden_by: by, clearance_m: clearance, wood_m: wood, transmission } = found;
     this.marks.draw(visible ? [[...ends, FREE]] : [[ends[0], blocker, FREE], [blocker, ends[1], HIDDEN]]);
@@ -117,12 +119,13 @@ export class Tools {
     tell(profileInWords(found), (canvas) => drawProfile(canvas, found));
   }
 
-  /** What is seen from where the observer stands, or from above the ground below. */
+  /** What is seen from where the observer stands, on the ground or on a deck, or from above the ground below. */
   async viewshed() {
     if (this.overlay) return this.clear();
     const { area, tank } = this.view, place = area.inSystem(tank.east, tank.north);
-    const above = Math.max(tank.altitude - (tank.height ?? tank.altitude), 0);
-    const eye = tank.flies && at("aloft").checked ? above : Number(at("eye").value);
+    const above = (height) => this.view.terrain.aboveGround(tank.east, tank.north, height ?? -Infinity);
+    const eye = tank.flies && at("aloft").checked ? above(tank.altitude)
+      : above(tank.flies ? null : tank.height) + Number(at("eye").value);
     tell("looking …");
     const target = Number(at("target").value), range = 1000 * (Number(at("reach").value) || 5);
     const spacing = Math.max(SPACING_M, Math.ceil((2 * range) / (SIDE_MAX - 1)));
