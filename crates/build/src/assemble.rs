@@ -11,7 +11,7 @@ use terrain::{
     TileId, Tin, Vertex, in_turn,
 };
 use tin::load_modules::{
-    ClipHeights, Layout, clear_decks, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, stand,
+    ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, put_decks, stand,
 };
 
 use crate::ground::Window;
@@ -135,10 +135,11 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
     let mut decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
     let is_of_features = |class: u8| class == HOLE_CLASS || run.job.is_of_features(class);
-    for ((module, lines), ((decks, most), _)) in modules.iter_mut().zip(&lines).zip(&mut decks) {
-        *most -= clear_decks(module, decks, lines, is_of_features, *most - decks.triangles.len());
+    for ((module, lines), ((decks, most), bridges)) in modules.iter_mut().zip(&lines).zip(&mut decks) {
+        if !decks.is_empty() {
+            *most -= put_decks(module, (decks, bridges), lines, is_of_features, *most);
+        }
     }
-    lift(&mut modules, &decks);
     if keys::have_lines(run.job) {
         modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
     }

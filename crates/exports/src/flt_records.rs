@@ -378,7 +378,14 @@ mod tests {
         all.vertices(&[FltVertex { place: [0.0; 3], normal: [0.0, 0.0, 1.0], uv: Some([0.25, 0.5]) }; 3]);
         all.face(
             [0, 1, 2],
-            Face { codes: [3, 0], material: 0, color: [255; 3], is_seen_from_below: false, has_texture: true },
+            Face {
+                codes: [3, 0],
+                material: 0,
+                color: [255; 3],
+                is_seen_from_below: false,
+                is_terrain: true,
+                has_texture: true,
+            },
             None,
         );
         let found = records(&all.bytes);

@@ -62,6 +62,8 @@ pub struct Verdict {
     pub decks: Option<String>,
     /// What stands on the ground, in words; nothing of a job without objects.
     pub objects: Option<String>,
+    /// Limits that are exceeded, as the build told: no damage.
+    pub breaches: u64,
 }
 
 /// Re-reads every file of a database and checks what a simulator relies on; with `dem`, recomputes residuals.
@@ -70,7 +72,7 @@ pub struct Verdict {
 /// When there is no database, or `dem` cannot be used for its area. Damage is not an error but a problem.
 pub fn verify(folder: &Path, dem: Option<&Path>) -> Result<Verdict, CompileError> {
     let manifest = Folder::new(folder).manifest()?;
-    let mut verdict = Verdict::default();
+    let mut verdict = Verdict { breaches: manifest.totals.breaches, ..Verdict::default() };
     if manifest.state != ManifestState::Complete {
         verdict.problems.push("database.json: incomplete: a build began and has not ended".into());
         return Ok(verdict);

@@ -42,6 +42,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         1 => format!("damaged: 1 problem; {checked}\n"),
         problems => format!("damaged: {} problems; {checked}\n", grouped(problems as u64)),
     };
+    if 0 < verdict.breaches {
+        let exceeded =
+            if verdict.breaches == 1 { "1 is".to_owned() } else { format!("{} are", grouped(verdict.breaches)) };
+        text += &format!("limits: {exceeded} exceeded, as breaches.csv lists\n");
+    }
     if let Some(residual) = &verdict.residual {
         let (rms_m, max_m, p99_m) = (residual.rms_m, residual.max_m, residual.p99_m);
         text += &format!("residual: RMS {rms_m:.3} m, 99 % within {p99_m:.2} m, largest {max_m:.2} m\n");

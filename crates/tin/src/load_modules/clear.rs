@@ -1,11 +1,12 @@
-//! Ground lowered where its triangles stand above decks: beside a higher road, or where no post lies under a bridge.
+//! Decks put over the ground, which is lowered where its triangles stand above them: beside a higher road, or where no
+//! post lies under a bridge.
 //!
 //! A vertex on the deck is put into such a triangle, as limits leave room. Triangles of features stay, and so do edges
 //! along lines, vertices and the sides of the load module.
 
 use terrain::{Decks, LoadModule, ModuleLine, ModuleVertex};
 
-use crate::load_modules::lift::{apart, at, bounds, common, cross, dot, weights};
+use crate::load_modules::lift::{ADDED_FOR, apart, at, bounds, common, cross, deepest, dot, lift_decks, weights};
 
 /// Quanta above a deck for which a vertex is put in: 0.1 m.
 const CLEARED_FOR: f64 = 12.0;
@@ -27,9 +28,38 @@ struct Lowering {
     triangles: Vec<usize>,
 }
 
-/// Puts vertices into natural triangles of the ground, those whose class is none of features, where these stand above
-/// decks, by at most so many triangles more. Returns how many.
-pub fn clear_decks(
+/// Gives a load module its decks, `drawn`, and lowers natural ground, whose class is none of features, where it stands
+/// above them; what then still does, they are raised onto. Both have at most so many triangles together as decks may
+/// have. Returns how many of these went to the ground: as many as leave decks least far below it.
+pub fn put_decks(
+    ground: &mut LoadModule,
+    (drawn, bridges): (&Decks, &[ModuleLine]),
+    lines: &[ModuleLine],
+    is_of_features: impl Fn(u8) -> bool,
+    most: usize,
+) -> usize {
+    let spare = most - drawn.triangles.len();
+    let mut best: Option<(f64, usize, LoadModule)> = None;
+    for room in [spare, spare / 2, 0] {
+        let mut cleared = ground.clone();
+        let added = clear_decks(&mut cleared, drawn, lines, &is_of_features, room);
+        cleared.decks = lift_decks(drawn, bridges, &cleared, most - added);
+        let below = deepest(&cleared.decks, &cleared);
+        if best.as_ref().is_none_or(|(least, ..)| below < *least) {
+            best = Some((below, added, cleared));
+        }
+        if below <= ADDED_FOR || added == 0 {
+            break;
+        }
+    }
+    let (_, added, cleared) = best.expect("one at least is tried");
+    *ground = cleared;
+    added
+}
+
+/// Puts vertices into natural triangles of the ground where these stand above decks, by at most so many triangles more.
+/// Returns how many.
+fn clear_decks(
     ground: &mut LoadModule,
     decks: &Decks,
     lines: &[ModuleLine],

@@ -41,7 +41,7 @@ const LAST_TIMES: usize = 4;
 const WEIGHT_MIN: f64 = 1e-9;
 
 /// Quanta under the ground for which a corner is added.
-const ADDED_FOR: f64 = 4.0;
+pub(super) const ADDED_FOR: f64 = 4.0;
 
 /// The decks of a load module, raised onto the triangles of the ground that stand above them as far as corners reach,
 /// with at most so many triangles. They belong to `bridges`, of which the load module need not have lines.
@@ -77,6 +77,12 @@ pub fn lift_decks(drawn: &Decks, bridges: &[ModuleLine], ground: &LoadModule, mo
             return lift.raised();
         }
     }
+}
+
+/// How far the ground stands above decks at most, in quanta.
+pub(super) fn deepest(decks: &Decks, ground: &LoadModule) -> f64 {
+    let reaches = Lift::of(ground, decks, &[]).reaches(ground);
+    reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max)
 }
 
 /// Decks with one more corner at a place of a triangle, and of its neighbour where it lies on an edge; nothing where
@@ -499,12 +505,6 @@ mod tests {
         let [a, b, c, d] = [(0, 6000), (6000, 6000), (6000, 6640), (0, 6640)].map(at);
         let [e, f] = [(SIDE, 6000), (SIDE, 6640)].map(at);
         Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3), ([b, e, f], 3), ([b, f, c], 3)])
-    }
-
-    /// How far the ground stands above decks at most.
-    fn deepest(decks: &Decks, ground: &LoadModule) -> f64 {
-        let reaches = Lift::of(ground, decks, &[]).reaches(ground);
-        reaches.iter().map(|reach| reach.missing).fold(0.0, f64::max)
     }
 
     #[test]

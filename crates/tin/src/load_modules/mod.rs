@@ -15,7 +15,7 @@ mod concatenate;
 mod decks;
 pub use decks::{SPARE_MAX, cut_decks};
 mod clear;
-pub use clear::clear_decks;
+pub use clear::put_decks;
 mod lift;
 pub use lift::lift_decks;
 mod lines;
