@@ -184,14 +184,20 @@ impl Textures {
 /// Gives texels along the rim those beside them inside, where pictures end between both: what lies beyond is blended in
 /// along the border.
 fn repeat_edge(pixels: &mut [u8], side: usize, [wide, high]: [usize; 2]) {
-    let at = |x: usize, y: usize| 4 * (y * side + x);
-    let rows = (0..wide).flat_map(|x| [(x, 0), (x, high - 1)]);
-    let rim = rows.chain((0..high).flat_map(|y| [(0, y), (wide - 1, y)]));
-    for (x, y) in rim {
-        let (own, inside) = (at(x, y), at(x.clamp(1, wide - 2), y.clamp(1, high - 2)));
+    let mut repeat = |own: [usize; 2], inside: [usize; 2]| {
+        let [own, inside] = [own, inside].map(|[x, y]| 4 * (y * side + x));
         if pixels[own + 3] < pixels[inside + 3] {
             pixels.copy_within(inside..inside + 4, own);
         }
+    };
+    // Along a side that two textures share both have what lies beside it from the same picture.
+    for x in 0..wide {
+        repeat([x, 0], [x, 1]);
+        repeat([x, high - 1], [x, high - 2]);
+    }
+    for y in 0..high {
+        repeat([0, y], [1, y]);
+        repeat([wide - 1, y], [wide - 2, y]);
     }
 }
 

@@ -150,7 +150,7 @@ pub fn traits<'a>(
 /// Whether nothing of it stands above the ground: a car park under a square, a station.
 fn lies_underground<'a>(tag: impl Fn(&str) -> Option<&'a str>) -> bool {
     let is_building = ["building", "building:part"].into_iter().filter_map(&tag).any(is_yes);
-    let is_below = |layer: &str| decimal(layer.trim()).is_some_and(|layer| layer < 0.0);
+    let is_below = |layer: &str| layer.trim().strip_prefix('-').and_then(decimal).is_some_and(|layer| 0.0 < layer);
     let is_said = tag("location") == Some("underground") || tag("is_underground") == Some("true");
     is_building && (is_said || tag("layer").is_some_and(is_below))
 }

@@ -11,6 +11,8 @@ use terrain::{
     Dem, LATTICE_PER_POST, LatticePoint, LoadModule, ModuleId, ModuleVertex, TileFeatures, metres_of_quanta,
 };
 
+use super::tins::height_at;
+
 /// The first revision whose vertices keep within the bounds.
 const BOUNDED_SINCE: u32 = 10;
 /// Posts around a tile that bound its vertices.
@@ -115,14 +117,20 @@ impl<'a> Around<'a> {
         height_bounds(&self.dem, self.place(module, vertex), self.quanta_per_post)
     }
 
-    /// Whether something else than the ground decided the height: a feature, water, the job, or the edge of a triangle
-    /// that a side of the load module cuts.
+    /// Whether something else than the ground decided the height: a feature, water, the job, a deck that the ground was
+    /// lowered onto, or the edge of a triangle that a side of the load module cuts.
     fn is_exempt(&self, module: &LoadModule, vertex: &ModuleVertex) -> bool {
         let is_on_side = [vertex.x, vertex.y].iter().any(|&at| at == 0 || at == module.side);
         let place = self.place(module, vertex);
         let step = self.quanta_per_post / i64::from(LATTICE_PER_POST);
         let at = LatticePoint::new((place.0 / step) as i32, (place.1 / step) as i32);
+        let decks = &module.decks;
+        let is_below = |deck: &[u16; 3]| {
+            let deck = deck.map(|corner| decks.vertices[usize::from(corner)]);
+            height_at(&deck, *vertex).is_some_and(|height| f64::from(vertex.z) <= height + 1.0)
+        };
         (self.is_clipped && is_on_side)
+            || decks.triangles.iter().any(is_below)
             || self.given.contains(&place)
             || self.bodies.lake_level_in(at, LATTICE_PER_POST).is_some()
     }

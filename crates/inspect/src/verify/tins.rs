@@ -201,7 +201,7 @@ fn outline(triangles: &[[ModuleVertex; 3]]) -> BTreeSet<[ModuleVertex; 2]> {
 }
 
 /// The height of a triangle at a place; `None` beside it.
-fn height_at(triangle: &[ModuleVertex; 3], place: ModuleVertex) -> Option<f64> {
+pub(super) fn height_at(triangle: &[ModuleVertex; 3], place: ModuleVertex) -> Option<f64> {
     /// Quanta beside an edge at which a place that was rounded counts as on it.
     const ROUNDED: f64 = 1.5;
     let along = |from: ModuleVertex, to: ModuleVertex| {

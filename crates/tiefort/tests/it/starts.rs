@@ -66,6 +66,41 @@ fn a_job_that_init_writes_builds_at_once() {
 }
 
 #[test]
+fn the_sea_of_a_raster_is_water_in_the_job_that_init_writes() {
+    let scene = Scene::new();
+    let coast = |row: usize, col: usize| if col < 50 { "0".into() } else { (3 * (col - 49) + row % 7).to_string() };
+    fs::write(scene.path("coast.asc"), grid(0, coast)).unwrap();
+    scene.run_to(0, &["init", "coast.asc", "--crs", "EPSG:32611", "--out", "job.toml"]);
+    let job = fs::read_to_string(scene.path("job.toml")).unwrap();
+    let (said, area) =
+        ("The sea: 62 % of the posts lie level at 0 m", "{ level_m = 0, class = \"water\", weight = 1 }");
+    assert!(job.contains(said) && job.contains(area), "{job}");
+    scene.run_to(0, &["build", "job.toml", "--out", "a.tdb", "--strict"]);
+    scene.run_to(0, &["verify", "a.tdb", "--dem", "coast.asc"]);
+    scene.run_to(0, &["export", "a.tdb", "--format", "obj", "--out", "a.obj"]);
+    let text = fs::read_to_string(scene.path("a.obj")).unwrap();
+    let (mut heights, mut material, mut wet) = (Vec::new(), "", Vec::new());
+    for line in text.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words[0] {
+            "v" => heights.push(words[3].parse::<f64>().unwrap()),
+            "usemtl" => material = words[1],
+            "f" if material.contains("water") => {
+                let corner = |word: &&str| word.split('/').next().unwrap().parse::<usize>().unwrap();
+                wet.push(words[1..].iter().map(corner).map(|at| heights[at - 1]).fold(0.0, f64::max));
+            }
+            _ => {}
+        }
+    }
+    let level = wet.iter().filter(|height| **height < 0.1).count();
+    assert!(!wet.is_empty() && wet.len() <= 2 * level, "{level} of {} triangles of water lie level", wet.len());
+    let nowhere = job.replace("level_m = 0", "level_m = -7.5");
+    fs::write(scene.path("nowhere.toml"), nowhere).unwrap();
+    let said = scene.run_to(0, &["build", "nowhere.toml"]).stderr;
+    assert!(said.contains("importance.areas[0] matches nothing: nowhere in the area are 5 x 5 posts"), "{said}");
+}
+
+#[test]
 fn init_says_what_a_file_lacks() {
     let scene = Scene::new();
     fs::write(scene.path("a.asc"), grid(0, hills)).unwrap();

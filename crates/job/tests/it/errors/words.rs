@@ -119,7 +119,7 @@ fn unknown_keys_are_told_with_the_nearest_known_one() {
         r#"areas = [{ file = "m.geojson", clas = "m", weight = 1 }]"#,
         &[
             "a/b.toml:10: importance.areas[0].clas: found a key that no job has, expected one of file, raster,",
-            "value, slope_above_percent, smooth_m, sample, class, weight",
+            "value, slope_above_percent, smooth_m, level_m, sample, class, weight",
             "hint: did you mean class?",
         ],
     );
@@ -314,7 +314,7 @@ fn values_of_the_wrong_type_are_told_as_written() {
         &[
             r#"a/b.toml:10: importance.areas: found the table { sample = "mountains" }, expected a list of at most"#,
             "1000 areas, each { file = … } or { raster = …, value = … } or { sample = … } or",
-            "{ slope_above_percent = … }",
+            "{ slope_above_percent = … } or { level_m = … }",
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
@@ -323,7 +323,7 @@ fn values_of_the_wrong_type_are_told_as_written() {
         "areas = [3]",
         &[
             "a/b.toml:10: importance.areas[0]: found the whole number 3, expected a table of file, raster,",
-            "value, slope_above_percent, smooth_m, sample, class, weight",
+            "value, slope_above_percent, smooth_m, level_m, sample, class, weight",
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
