@@ -102,8 +102,13 @@ impl Refinement {
             (grown, optimised)
         };
         let Some((mut own, plain)) = self.to_largest(&|task| grown(task, chosen)) else {
-            let (grown, optimised) = optimised(self);
-            return self.join(grown, optimised);
+            let (chosen, optimised) = optimised(self);
+            let (count, is_short) = (optimised.tin.triangles.len(), !optimised.short.is_empty());
+            let best = self.join(chosen, optimised);
+            // Between crowded pins nothing may be left that can go: what only grew has not more than it may.
+            let is_crowded = is_short && self.task.start.iter().any(|start| start.pinned);
+            let plain = is_crowded.then(|| self.woven(window, grown(&self.task, weighted)));
+            return plain.filter(|plain| plain.tin.triangles.len() < count).unwrap_or(best);
         };
         loop {
             let (grown, optimised) = optimised(&own);

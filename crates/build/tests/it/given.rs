@@ -346,11 +346,13 @@ fn points_on_a_fixed_outer_border_count_in_the_limits() {
 
 #[test]
 fn crowded_pins_leave_the_limits_whole_where_there_is_room_for_them() {
-    // In the first tile a pin on every third post of each third row; together a fifth of the triangles of the area.
-    let places = |side: i32| (1..side).step_by(3).flat_map(move |row| (1..side).step_by(3).map(move |col| (row, col)));
+    // In the first tile a pin on every second post of each second row: together three fifths of the area's triangles.
+    let places = |side: i32| (1..side).step_by(2).flat_map(move |row| (1..side).step_by(2).map(move |col| (row, col)));
     let pins: Vec<(&str, i32, i32, &str)> = places(3 * SIDE_CELLS).map(|(row, col)| ("add", row, col, "")).collect();
+    let limits = "mean_per_load_module = 32\nper_load_module = 600\nper_4km_square = 40000";
     for tin in [CONSTRAINED, "effort = \"fast\"", "effort = \"normal\""] {
-        let scene = pinned(tin, &pins);
+        let crowded = Words { limits: limits.into(), ..words(&format!("{tin}\npins = \"pins.geojson\"")) };
+        let scene = Scene::with_files(&crowded, |folder| write_pins(&folder.join("pins.geojson"), &pins));
         let report = scene.build("a.tdb", 2).report;
         assert!(report.breaches.is_empty(), "{tin}: {:?}", report.breaches);
         let at: BTreeSet<Post> = vertices(&scene, "a.tdb").into_iter().map(|(post, _)| post).collect();
