@@ -110,7 +110,7 @@ fn looks(file: &GeoParquet, columns: &Type) -> Result<bool, SourceError> {
         }
         Ok(())
     })?;
-    Ok(look_like_degrees(vertices.iter()))
+    Ok(look_like_degrees(vertices.into_iter()))
 }
 
 /// Places a feature, a segment of Overture in the parts along which its rules hold.

@@ -27,8 +27,12 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         }
     };
     let said = wanted.system(|| said_by(path, written.crs.as_ref()))?;
+    // Where nothing is said all is read twice, rather than kept.
+    let shapes = || written.features().filter_map(|feature| feature.shape?.ok());
+    let vertices = || shapes().flat_map(|shape| shape.vertices().copied().collect::<Vec<_>>());
+    let said = said.or_else(|| look_like_degrees(vertices()).then(Crs::wgs84));
+    let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
     let (name, mut texts) = (file_name(store), Texts::default());
-    let (mut raw, mut faults) = (Vec::new(), Vec::new());
     for (index, Loose { properties, shape }) in written.features().enumerate() {
         let id = format!("{name}#{index}");
         let shape = match shape {
@@ -36,24 +40,18 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
             None => continue,
             Some(Ok(shape)) => shape,
             Some(Err(found)) => {
-                faults.push((id, found));
+                placing.count_left_out();
+                placing.leave_out(&id, found);
                 continue;
             }
         };
         let tags: Vec<(String, String)> =
             properties.into_iter().flatten().filter_map(|(key, value)| Some((key, text_of(value)?))).collect();
         let tags = with_packed_tags(tags.iter().map(|(key, value)| (key.as_str(), value.as_str())));
-        raw.push(RawFeature { id, tags: texts.tags(tags), shape });
+        let feature = RawFeature { id, tags: texts.tags(tags), shape };
+        texts.count(placing.allowance());
+        placing.place(feature);
     }
-    let all = raw.iter().flat_map(|feature| feature.shape.vertices());
-    let said = said.or_else(|| look_like_degrees(all).then(Crs::wgs84));
-    let mut placing = Placing::new(path, store.file_bytes(), wanted, said)?;
-    for (id, found) in faults {
-        placing.count_left_out();
-        placing.leave_out(&id, found);
-    }
-    texts.count(placing.allowance());
-    raw.into_iter().for_each(|feature| placing.place(feature));
     placing.finish(None)
 }
 

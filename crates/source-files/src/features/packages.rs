@@ -139,5 +139,5 @@ fn looks(path: &Path, package: &Package, table: &Table) -> Result<bool, SourceEr
         }
         Ok(())
     })?;
-    Ok(look_like_degrees(vertices.iter()))
+    Ok(look_like_degrees(vertices.into_iter()))
 }

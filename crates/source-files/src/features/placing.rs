@@ -13,8 +13,8 @@ use crate::polygons::pieces_of;
 use crate::{SourceError, short};
 
 /// Whether most places can only be degrees; what nothing is said about is taken for WGS 84 then.
-pub(super) fn look_like_degrees<'v>(vertices: impl Iterator<Item = &'v Vertex>) -> bool {
-    let is_degrees = |[east, north, _]: &Vertex| east.abs() <= 360.0 && north.abs() <= 90.0;
+pub(super) fn look_like_degrees(vertices: impl Iterator<Item = Vertex>) -> bool {
+    let is_degrees = |[east, north, _]: Vertex| east.abs() <= 360.0 && north.abs() <= 90.0;
     let (all, degrees) =
         vertices.fold((0_u64, 0_u64), |(all, degrees), vertex| (all + 1, degrees + u64::from(is_degrees(vertex))));
     all < 2 * degrees

@@ -76,7 +76,7 @@ fn looks(store: &Store, bytes: &[u8], index: Option<&[u8]>) -> Result<bool, Sour
             Shape::Nothing | Shape::Other(_) => {}
         }
     }
-    Ok(look_like_degrees(vertices.iter()))
+    Ok(look_like_degrees(vertices.into_iter()))
 }
 
 /// A record as lines and polygons, or how many rings it has where those are too many.

@@ -63,7 +63,8 @@ seed = 3"#,
         r#"areas = [{ class = "m", weight = 1 }]"#,
         &[
             r#"a/b.toml:10: importance.areas[0]: found { class = "m", weight = 1 }, expected exactly one of file"#,
-            r#"= "x.geojson", raster = "x.tif" with value, sample = "mountains", slope_above_percent = 20, level_m = 0"#,
+            r#"= "x.geojson", raster = "x.tif" with value, sample = "mountains", slope_above_percent = 20,"#,
+            "level_m = 0",
             r#"hint: for example areas = [{ file = "mountains.geojson", class = "mountains", weight = 1 }]"#,
         ],
     );
