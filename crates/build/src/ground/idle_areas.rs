@@ -1,5 +1,5 @@
-//! Areas of importance that hold no post: a wrong value of a class raster, polygons that lie elsewhere. A person should
-//! know of them, since the ground is built as if the job did not name them.
+//! Areas of importance that hold no post: a wrong value of a class raster, polygons that lie elsewhere, a height at which
+//! nothing lies level. A person should know of them, since the ground is built as if the job did not name them.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
@@ -18,8 +18,8 @@ const TILES_AT_ONCE: usize = 64;
 /// Values of a class raster that are named.
 const VALUES_NAMED: usize = 8;
 
-/// A sentence for each area of importance of polygons or of a class raster that holds no post of the gaming area;
-/// `posts` are those of each class of the job, as a build counts them anyway.
+/// A sentence for each area of importance of polygons, of a class raster or of level ground that holds no post of the
+/// gaming area; `posts` are those of each class of the job, as a build counts them anyway.
 ///
 /// No file is read for an area whose class has posts that no other part of the job can have given it.
 ///
