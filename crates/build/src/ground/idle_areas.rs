@@ -1,5 +1,5 @@
-//! Areas of importance that hold no post: a wrong value of a class raster, polygons that lie elsewhere, a height at which
-//! nothing lies level. A person should know of them, since the ground is built as if the job did not name them.
+//! Areas of importance that hold no post: a wrong value of a class raster, polygons that lie elsewhere, a height at
+//! which nothing lies level. A person should know of them, since the ground is built as if the job did not name them.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
