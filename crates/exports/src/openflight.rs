@@ -117,7 +117,7 @@ const NAME_LETTERS: usize = 11;
 /// in a number.
 fn short_names(names: impl Iterator<Item = String>) -> Vec<String> {
     let mut known: BTreeMap<String, String> = BTreeMap::new();
-    let mut short = |name: String| {
+    let short = |name: String| {
         let cut = |letters: usize| name.chars().take(letters).collect::<String>();
         if let Some(known) = known.get(&name) {
             return known.clone();
@@ -128,7 +128,7 @@ fn short_names(names: impl Iterator<Item = String>) -> Vec<String> {
         known.insert(name, found.clone());
         found
     };
-    names.map(|name| short(name)).collect()
+    names.map(short).collect()
 }
 
 /// What a level has in a square: the group of the ground is there in any case, with an object for each load module.
