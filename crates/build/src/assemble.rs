@@ -133,11 +133,13 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
         lines.iter().filter(|line| keys::has_deck(&line.traits)).cloned().collect()
     };
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
-    let mut decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
+    let decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
     let is_of_features = |class: u8| class == HOLE_CLASS || run.job.is_of_features(class);
-    for ((module, lines), ((decks, most), bridges)) in modules.iter_mut().zip(&lines).zip(&mut decks) {
+    // Triangles that each load module may have where it has decks.
+    let most: Vec<usize> = modules.iter().zip(&decks).map(|(of, ((_, most), _))| of.triangles.len() + most).collect();
+    for ((module, lines), ((decks, most), bridges)) in modules.iter_mut().zip(&lines).zip(&decks) {
         if !decks.is_empty() {
-            *most -= put_decks(module, (decks, bridges), lines, is_of_features, *most);
+            put_decks(module, (decks, bridges), lines, is_of_features, *most);
         }
     }
     if keys::have_lines(run.job) {
@@ -147,7 +149,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
     let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
-    levels[1..].iter_mut().for_each(|level| lift(level, &decks));
+    levels[1..].iter_mut().for_each(|level| lift(level, &decks, &most));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     place_objects(run, stamps, &mut levels, objects.as_ref(), &layout)?;
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
@@ -182,12 +184,13 @@ fn place_objects(
     Ok(())
 }
 
-/// Gives load modules their decks, with how many triangles these may have and the lines of their bridges, raised onto
-/// the ground of each.
-fn lift(modules: &mut [LoadModule], decks: &[((Decks, usize), Vec<ModuleLine>)]) {
-    let are_there = modules.iter_mut().zip(decks).filter(|(_, ((decks, _), _))| !decks.is_empty());
-    for (module, ((decks, most), bridges)) in are_there {
-        module.decks = lift_decks(decks, bridges, module, *most);
+/// Gives load modules of a coarser level their decks, with how many triangles these may have and the lines of their
+/// bridges, raised onto the ground of each; both together have at most so many triangles as the finest level may.
+fn lift(modules: &mut [LoadModule], decks: &[((Decks, usize), Vec<ModuleLine>)], most: &[usize]) {
+    let all = modules.iter_mut().zip(decks).zip(most);
+    for ((module, ((decks, most), bridges)), all) in all.filter(|((_, ((decks, _), _)), _)| !decks.is_empty()) {
+        let room = all.saturating_sub(module.triangles.len()).clamp(decks.triangles.len(), *most);
+        module.decks = lift_decks(decks, bridges, module, room);
     }
 }
 

@@ -30,31 +30,29 @@ struct Lowering {
 
 /// Gives a load module its decks, `drawn`, and lowers natural ground, whose class is none of features, where it stands
 /// above them; what then still does, they are raised onto. Both have at most so many triangles together as decks may
-/// have. Returns how many of these went to the ground: as many as leave decks least far below it.
+/// have; as many of these go to the ground as leave decks least far below it.
 pub fn put_decks(
     ground: &mut LoadModule,
     (drawn, bridges): (&Decks, &[ModuleLine]),
     lines: &[ModuleLine],
     is_of_features: impl Fn(u8) -> bool,
     most: usize,
-) -> usize {
+) {
     let spare = most - drawn.triangles.len();
-    let mut best: Option<(f64, usize, LoadModule)> = None;
+    let mut best: Option<(f64, LoadModule)> = None;
     for room in [spare, spare / 2, 0] {
         let mut cleared = ground.clone();
         let added = clear_decks(&mut cleared, drawn, lines, &is_of_features, room);
         cleared.decks = lift_decks(drawn, bridges, &cleared, most - added);
         let below = deepest(&cleared.decks, &cleared);
-        if best.as_ref().is_none_or(|(least, ..)| below < *least) {
-            best = Some((below, added, cleared));
+        if best.as_ref().is_none_or(|(least, _)| below < *least) {
+            best = Some((below, cleared));
         }
         if below <= ADDED_FOR || added == 0 {
             break;
         }
     }
-    let (_, added, cleared) = best.expect("one at least is tried");
-    *ground = cleared;
-    added
+    *ground = best.expect("one at least is tried").1;
 }
 
 /// Puts vertices into natural triangles of the ground where these stand above decks, by at most so many triangles more.
