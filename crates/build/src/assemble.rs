@@ -135,8 +135,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
     let decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
     let is_of_features = |class: u8| class == HOLE_CLASS || run.job.is_of_features(class);
-    // Triangles that each load module may have where it has decks.
-    let most: Vec<usize> = modules.iter().zip(&decks).map(|(of, ((_, most), _))| of.triangles.len() + most).collect();
+    let bare = if run.job.lod.level_count() == 1 { Vec::new() } else { modules.clone() };
     for ((module, lines), ((decks, most), bridges)) in modules.iter_mut().zip(&lines).zip(&decks) {
         if !decks.is_empty() {
             put_decks(module, (decks, bridges), lines, is_of_features, *most);
@@ -148,8 +147,17 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
-    let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
-    levels[1..].iter_mut().for_each(|level| lift(level, &decks, &most));
+    let mut levels = match bare.is_empty() {
+        true => vec![modules],
+        false => {
+            // Coarser levels are made of vertices of the TIN: those that lowered the ground onto decks are none.
+            let bare = with_grounds(&modules, bare);
+            let mut levels = all_levels(run, bare, (&layout, &window.dem, &natural.importance), &features);
+            levels[0] = modules;
+            levels
+        }
+    };
+    levels[1..].iter_mut().for_each(|level| lift(level, &decks));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     place_objects(run, stamps, &mut levels, objects.as_ref(), &layout)?;
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
@@ -184,13 +192,24 @@ fn place_objects(
     Ok(())
 }
 
+/// Load modules with the ground of others in the place of their own.
+fn with_grounds(modules: &[LoadModule], grounds: Vec<LoadModule>) -> Vec<LoadModule> {
+    let with = |(module, ground): (&LoadModule, LoadModule)| LoadModule {
+        vertices: ground.vertices,
+        triangles: ground.triangles,
+        classes: ground.classes,
+        polygon_count: ground.polygon_count,
+        ..module.clone()
+    };
+    modules.iter().zip(grounds).map(with).collect()
+}
+
 /// Gives load modules of a coarser level their decks, with how many triangles these may have and the lines of their
-/// bridges, raised onto the ground of each; both together have at most so many triangles as the finest level may.
-fn lift(modules: &mut [LoadModule], decks: &[((Decks, usize), Vec<ModuleLine>)], most: &[usize]) {
-    let all = modules.iter_mut().zip(decks).zip(most);
-    for ((module, ((decks, most), bridges)), all) in all.filter(|((_, ((decks, _), _)), _)| !decks.is_empty()) {
-        let room = all.saturating_sub(module.triangles.len()).clamp(decks.triangles.len(), *most);
-        module.decks = lift_decks(decks, bridges, module, room);
+/// bridges, raised onto the ground of each.
+fn lift(modules: &mut [LoadModule], decks: &[((Decks, usize), Vec<ModuleLine>)]) {
+    let are_there = modules.iter_mut().zip(decks).filter(|(_, ((decks, _), _))| !decks.is_empty());
+    for (module, ((decks, most), bridges)) in are_there {
+        module.decks = lift_decks(decks, bridges, module, *most);
     }
 }
 
