@@ -135,7 +135,9 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
     let decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();
     let is_of_features = |class: u8| class == HOLE_CLASS || run.job.is_of_features(class);
-    let bare = if run.job.lod.level_count() == 1 { Vec::new() } else { modules.clone() };
+    let bare =
+        |(module, ((decks, _), _)): (&LoadModule, &((Decks, usize), _))| (!decks.is_empty()).then(|| module.clone());
+    let mut bare: Vec<Option<LoadModule>> = modules.iter().zip(&decks).map(bare).collect();
     for ((module, lines), ((decks, most), bridges)) in modules.iter_mut().zip(&lines).zip(&decks) {
         if !decks.is_empty() {
             put_decks(module, (decks, bridges), lines, is_of_features, *most);
@@ -147,16 +149,10 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
     let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
-    let mut levels = match bare.is_empty() {
-        true => vec![modules],
-        false => {
-            // Coarser levels are made of vertices of the TIN: those that lowered the ground onto decks are none.
-            let bare = with_grounds(&modules, bare);
-            let mut levels = all_levels(run, bare, (&layout, &window.dem, &natural.importance), &features);
-            levels[0] = modules;
-            levels
-        }
-    };
+    // Coarser levels are made of vertices of the TIN: those that lowered the ground onto decks are none.
+    swap_grounds(&mut modules, &mut bare);
+    let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
+    swap_grounds(&mut levels[0], &mut bare);
     levels[1..].iter_mut().for_each(|level| lift(level, &decks));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     place_objects(run, stamps, &mut levels, objects.as_ref(), &layout)?;
@@ -192,16 +188,15 @@ fn place_objects(
     Ok(())
 }
 
-/// Load modules with the ground of others in the place of their own.
-fn with_grounds(modules: &[LoadModule], grounds: Vec<LoadModule>) -> Vec<LoadModule> {
-    let with = |(module, ground): (&LoadModule, LoadModule)| LoadModule {
-        vertices: ground.vertices,
-        triangles: ground.triangles,
-        classes: ground.classes,
-        polygon_count: ground.polygon_count,
-        ..module.clone()
-    };
-    modules.iter().zip(grounds).map(with).collect()
+/// Gives load modules the ground of others, and these theirs.
+fn swap_grounds(modules: &mut [LoadModule], others: &mut [Option<LoadModule>]) {
+    for (module, other) in modules.iter_mut().zip(others).filter_map(|(module, other)| Some((module, other.as_mut()?)))
+    {
+        std::mem::swap(&mut module.vertices, &mut other.vertices);
+        std::mem::swap(&mut module.triangles, &mut other.triangles);
+        std::mem::swap(&mut module.classes, &mut other.classes);
+        std::mem::swap(&mut module.polygon_count, &mut other.polygon_count);
+    }
 }
 
 /// Gives load modules of a coarser level their decks, with how many triangles these may have and the lines of their

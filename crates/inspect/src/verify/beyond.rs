@@ -124,13 +124,15 @@ impl<'a> Around<'a> {
         let place = self.place(module, vertex);
         let step = self.quanta_per_post / i64::from(LATTICE_PER_POST);
         let at = LatticePoint::new((place.0 / step) as i32, (place.1 / step) as i32);
+        // On the lattice it is one of the TIN, which no deck moved.
+        let is_added = place.0 % step != 0 || place.1 % step != 0;
         let decks = &module.decks;
         let is_below = |deck: &[u16; 3]| {
             let deck = deck.map(|corner| decks.vertices[usize::from(corner)]);
             height_at(&deck, *vertex).is_some_and(|height| f64::from(vertex.z) <= height + 1.0)
         };
         (self.is_clipped && is_on_side)
-            || decks.triangles.iter().any(is_below)
+            || is_added && decks.triangles.iter().any(is_below)
             || self.given.contains(&place)
             || self.bodies.lake_level_in(at, LATTICE_PER_POST).is_some()
     }
