@@ -50,8 +50,10 @@ impl TileMesh<'_> {
         }
         self.triangle_count = self.triangle_count + patch.new.len() - patch.old.len();
         for (&vertex, &rise) in patch.refit.iter().zip(&patch.rise) {
-            self.vertices[vertex as usize].height += rise;
-            self.vertices[vertex as usize].has_changed = true;
+            let record = &mut self.vertices[vertex as usize];
+            // A rise that ends at a bound, added to the height again, may round to beside it.
+            record.height = self.ground.bounded(record.at, record.height + rise);
+            record.has_changed = true;
         }
         for &triangle in &patch.slots {
             self.settle(triangle);

@@ -12,6 +12,7 @@ use crate::optimiser::heights::fit_heights;
 use crate::optimiser::hold::Hold;
 use crate::optimiser::insertion::Insertion;
 use crate::optimiser::parts::{Layout, NONE, Parts};
+use crate::optimiser::patch::Patch;
 use crate::optimiser::place::{PER_POST, Place, is_needle};
 use crate::optimiser::removal::Removal;
 use crate::optimiser::scene::{even, grid, patchy, rough};
@@ -240,6 +241,26 @@ fn heights_fitted_at_once_leave_no_single_one_to_fit() {
                 assert!(fitted <= sheet.squares() + 1e-6 * fitted);
                 sheet.vertices[vertex as usize].height -= by;
                 star.triangles().for_each(|triangle| sheet.settle(triangle));
+            }
+        }
+    });
+}
+
+#[test]
+fn a_height_that_rises_to_its_bound_stands_there_exactly() {
+    with_sheet(|sheet, _| {
+        let mut patch = Patch::default();
+        for vertex in (0..sheet.vertices.len() as u32).filter(|&vertex| sheet.is_vertex(vertex)).collect::<Vec<_>>() {
+            let at = sheet.vertices[vertex as usize].at;
+            for (part, far) in [(7.0, 1e9), (11.0, -1e9)] {
+                let bound = sheet.ground.bounded(at, far);
+                let height = sheet.ground.bounded(at, bound / part);
+                sheet.vertices[vertex as usize].height = height;
+                patch.clear();
+                patch.refit.push(vertex);
+                patch.rise.push(bound - height);
+                sheet.apply(&mut patch);
+                assert_eq!(sheet.vertices[vertex as usize].height, bound);
             }
         }
     });
