@@ -77,10 +77,15 @@ impl Facets {
         Self::of_modules(scene.modules, scene.grid, scene.frame.spacing).with_covers_of(scene, scene.modules)
     }
 
-    /// The facets of a scene with the bands of its ways around a place, in metres from the area's south-west post.
-    pub(crate) fn with_bands_of(self, scene: &Scene, place_m: [f64; 2]) -> Self {
+    /// The facets of a scene with what stands on its ground, and with the bands of its ways around a place, in metres
+    /// from the area's south-west post. Maps draw both otherwise, and objects of a large area take more memory than all
+    /// else.
+    pub(crate) fn as_seen_from(self, scene: &Scene, place_m: [f64; 2]) -> Self {
         let bands = scene.features.map(|features| bands_of(scene, &features, place_m)).unwrap_or_default();
-        Self { bands, ..self }
+        let corner =
+            |module: &LoadModule| [module.id.col, module.id.row].map(|index| f64::from(index) * scene.side_m());
+        let objects = scene.modules.iter().flat_map(|module| solids(module, corner(module))).collect();
+        Self { bands, objects, kinds: kinds(scene.modules.iter()), ..self }
     }
 
     /// The facets of these load modules, told which of them lie over holes and which over water: those of a class.
@@ -105,10 +110,6 @@ impl Facets {
         modules: impl IntoIterator<Item = &'a LoadModule, IntoIter: Clone> + Clone,
     ) -> Self {
         let mut facets = self.with_covers(modules.clone(), scene.water);
-        let corner =
-            |module: &LoadModule| [module.id.col, module.id.row].map(|index| f64::from(index) * scene.side_m());
-        facets.objects = modules.clone().into_iter().flat_map(|module| solids(module, corner(module))).collect();
-        facets.kinds = kinds(modules.clone().into_iter());
         if let Some(features) = scene.features {
             let decks = modules.clone().into_iter().filter(|module| !module.decks.is_empty());
             facets.decks = decks.flat_map(|module| decks_of(module, scene, &features)).collect();
