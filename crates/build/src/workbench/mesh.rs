@@ -39,6 +39,8 @@ const POSTS_PER_POINT: usize = 24;
 pub struct Mesh {
     /// Vertices and triangles; rows and columns are those of the posts, from the south-west one.
     pub tin: Tin,
+    /// The same with the triangles that lie over voids, to be measured; `None` where nothing is void.
+    pub with_voids: Option<Tin>,
     /// The raster's heights, resampled where its own posts are not square ones in metres.
     pub dem: Arc<Dem>,
     /// Easting of post (0, 0), in metres.
@@ -132,8 +134,10 @@ impl Heights {
         let tally = tally_on_all(&self.dem, &tin, &workers, stop)?;
         let limit = fidelity::limit(&self.dem, tin.triangles.len(), &workers.each());
         // Residuals are those of all that is known, also at the rims of voids.
+        let with_voids = (0 < self.dem.void_count()).then(|| tin.clone());
         let tin = without_voids(tin, &self.dem);
         Ok(Mesh {
+            with_voids,
             points: tin.vertices.len(),
             residual: crate::residual_of(&tally),
             limit,
@@ -381,8 +385,8 @@ impl<'a> TinJob<'a> {
         });
         let started = start_posts(&given, task.rect, task.seams).iter().filter(|start| !start.pinned).count();
         task.stop.points = task.stop.points.map(|points| points.saturating_sub(started));
-        let (importance, forbidden, featured) = (weights(&dem), Vec::new(), Vec::new());
-        let window = Window { importance, dem, given, forbidden, featured };
+        let importance = weights(&dem);
+        let window = Window { given, ..Window::of(dem, importance) };
         let refinement = self.refinement(task);
         let sight = refinement.optimising.and_then(|optimising| optimising.sight);
         let in_squares = sight.map(|sight| {

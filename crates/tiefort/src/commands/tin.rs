@@ -201,7 +201,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         write_mesh(mesh, kind, on_map, out)?;
     }
     let measure = |mesh: &Mesh| {
-        arguments.measure.then(|| inspect::measure(&mesh.tin, &mesh.dem, Metres(mesh.spacing_m.0), Sights::USUAL))
+        // Eyes look over voids, too.
+        let tin = mesh.with_voids.as_ref().unwrap_or(&mesh.tin);
+        arguments.measure.then(|| inspect::measure(tin, &mesh.dem, Metres(mesh.spacing_m.0), Sights::USUAL))
     };
     let measured: Vec<Option<Fidelity>> = meshes.iter().map(measure).collect();
     match show {

@@ -223,6 +223,15 @@ fn a_mesh_is_measured_when_asked_and_more_points_show_more_of_the_truth() {
 }
 
 #[test]
+fn a_mesh_with_holes_where_the_raster_has_voids_is_measured_too() {
+    let scene = Scene::new();
+    let half = |east: f64, north: f64| if east < 506_000.0 { f64::NAN } else { 700.0 + (east + north) / 100.0 };
+    Raster::around(half).write(&scene.path("dem.tif"));
+    let said = scene.run_to(0, &["tin", "dem.tif", "--points", "60", "--measure", "--out", "mesh.ply"]);
+    assert!(said.stderr.contains("Line of sight"), "{}", said.stderr);
+}
+
+#[test]
 fn no_effort_makes_more_triangles_than_asked_for() {
     let scene = Scene::new();
     scene.run_to(0, &["sample", "--posts", "41", "--out", "dem.tif"]);
