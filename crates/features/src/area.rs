@@ -8,16 +8,17 @@ use terrain::{Each, QUANTA_PER_METRE, SideSlope};
 use crate::aground::{Beside, still_under, tell_of_hills, uncut, under_hills};
 use crate::earthworks::{Laid, earthworks};
 use crate::objects::{Plan, strips};
+use crate::passing::drowned;
 use crate::pieces::moved;
 use crate::roadsides::roadsides;
 use crate::rules::Sorted;
 use crate::watersides::{Watersides, watersides};
 use crate::{
     About, Bed, Below, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Kind, Lake,
-    Network, Node, Outline, Pin, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Strand, Traits, Waters,
-    Way, afloat, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level, lift_shores,
-    lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams, travelled, water,
-    with_water,
+    Network, Node, Outline, Pin, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Storey, Strand, Traits,
+    Waters, Way, afloat, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level,
+    lift_shores, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
+    travelled, water, with_water,
 };
 
 /// Features on the lattice of an area, before their heights are known.
@@ -246,6 +247,10 @@ impl AreaFeatures {
         water.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
         let below = Below { water: &water, is_known: &|place| self.site.holds(place) };
         let heights = grade(roads, [&resting, &amid], &pins, below, options, &mut remarks);
+        let streams = crate::water(strands.iter().filter(|strand| strand.role == crate::Role::Channel));
+        let drowned = drowned(roads, &heights, &streams, &mut remarks);
+        // Their heights stay: what was a deck is a road that fills the stream's bed.
+        let roads = &*roads.with_storey(drowned, Storey::Ground);
         let left = still_under(roads, &heights, (&self.deck_sides, &at), options.cut_max);
         let roads = &*roads.with_tunnels(&left);
         hills.extend(left);

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use terrain::{Each, gather};
 
 use crate::clean::Notes;
-use crate::culverts::{Culvert, culvert, enter_culverts, is_near};
+use crate::culverts::{Bank, Culvert, culvert, enter_culverts, in_banks, is_near};
 use crate::decks::between;
 use crate::exact::Segment;
 use crate::inside::{Inside, LINES_AT_ONCE};
@@ -398,23 +398,30 @@ fn assemble(lines: Vec<Strand>, site: &Site, remarks: &mut Vec<Remark>, each: Ea
     let mut culverts = Vec::new();
     for (number, (line, places)) in lines.iter().zip(&rounded).enumerate() {
         let mut cut = 0;
+        let passes = |at: usize| line.role == Role::Channel && heights[&places[at]].3 != own[number][at];
+        let passed = |at: usize| passes(at).then(|| heights[&places[at]].3);
+        let road = |at: usize| passed(at).filter(|_| heights[&places[at]].2 <= Role::Centre);
+        let banks = in_banks(places, &own[number], road, site);
+        let bank = |at: usize| banks[at].or_else(|| passed(at).map(Bank::at));
         for (at, ends) in places.windows(2).enumerate() {
-            let passes = |at: usize| line.role == Role::Channel && heights[&places[at]].3 != own[number][at];
             if covered.next().expect("of every edge whether it is covered") {
                 cut += site.lattice.length(ends[0], ends[1]);
-            } else if !passes(at) && !passes(at + 1) {
+            } else if bank(at).or(bank(at + 1)).is_none() {
                 let key = (ends[0].min(ends[1]), ends[0].max(ends[1]));
                 let mine = (line.class, line.role, line.id, ends[1] < ends[0]);
                 edges.push((key, mine));
-            } else if passes(at) != passes(at + 1) {
-                let ends = if passes(at) { [at, at + 1] } else { [at + 1, at] };
-                culverts.extend(culvert(line, ends.map(|at| (places[at], own[number][at])), site));
+            } else if bank(at).is_none() || bank(at + 1).is_none() {
+                let (ends, bank) = bank(at).map_or(([at + 1, at], bank(at + 1)), |bank| ([at, at + 1], Some(bank)));
+                let ends = ends.map(|at| (places[at], own[number][at]));
+                culverts.extend(bank.and_then(|bank| culvert(line, ends, bank, site)));
             }
             let above = passes(at) && (at == 0 || !passes(at - 1));
             if above {
-                let road = heights[&places[at]].2 <= Role::Centre;
-                let (flaw, remedy) =
-                    if road { (Flaw::RoadOverRiver, Remedy::Culvert) } else { (Flaw::Overlap, Remedy::Cut) };
+                let (flaw, remedy) = if road(at).is_some() {
+                    (Flaw::RoadOverRiver, Remedy::Culvert)
+                } else {
+                    (Flaw::Overlap, Remedy::Cut)
+                };
                 Notes { id: line.id, lattice: site.lattice, remarks }.write_at(places[at], flaw, remedy);
             }
         }
@@ -664,6 +671,31 @@ mod tests {
         rows.sort_unstable();
         let gaps = rows.windows(2).map(|pair| f64::from(pair[1][0] - pair[0][1]) * lattice.metres_per_step());
         assert!(rows.len() < 4 || gaps.fold(0.0, f64::max) < 30.0, "{rows:?}");
+    }
+
+    #[test]
+    fn a_stream_below_a_road_comes_to_light_beyond_the_banks_of_the_road() {
+        // The road fills a valley up by 12 m, so that its banks reach 24 m to both sides.
+        let valley = |east: f64, _: f64| if (23.0..27.0).contains(&east) { 18.0 } else { 30.0 };
+        let stream: Vec<(f64, f64)> = (0..=40).map(|step| (25.0, 10.0 + 0.5 * f64::from(step))).collect();
+        let sources =
+            vec![way(1, "highway=primary", &[(10.0, 20.0), (40.0, 20.0)]), way(2, "waterway=stream", &stream)];
+        let formed = formed(sources, valley);
+        let road = |edge: &&FormedEdge| edge.role <= Role::Centre;
+        let places = |edge: &FormedEdge| [edge.a, edge.b].map(|point| formed.points[point as usize]);
+        let at_stream = |(place, _): &(Place, i32)| (place.col - 25 * site().lattice.steps_per_post()).abs() < 40;
+        let heights = formed.edges.iter().filter(road).flat_map(places).filter(at_stream);
+        let road_m = heights.map(|(_, height)| f64::from(height) / 128.0).fold(0.0, f64::max);
+        assert!(24.0 < road_m, "{road_m}");
+        let metres = |row: i32| f64::from(row) * site().lattice.metres_per_step();
+        let middle = metres(20 * site().lattice.steps_per_post());
+        let channel = formed.edges.iter().filter(|edge| edge.role == Role::Channel).flat_map(places);
+        let near = channel.map(|(place, height)| {
+            let off_m = road_m - f64::from(height) / 128.0;
+            (metres(place.row) - middle).abs() - 2.0 * off_m
+        });
+        let near = near.fold(f64::INFINITY, f64::min);
+        assert!((0.0..20.0).contains(&near), "{near}");
     }
 
     #[test]

@@ -91,9 +91,9 @@ pub use lakes::{Histogram, Lake, Shores, Waters, banks, level, lift_shores, outl
 mod afloat;
 pub use afloat::{afloat, with_water};
 mod roadsides;
-pub use roadsides::{ROADSIDE_REACH_M, moved_by_road};
+pub use roadsides::moved_by_road;
 mod toes;
-pub use toes::CUT_RUN;
+pub use toes::{CUT_RUN, ROADSIDE_REACH_M};
 mod watersides;
 pub use watersides::{WATERSIDE_REACH_M, Watersides, nearest_on, offs};
 mod earthworks;

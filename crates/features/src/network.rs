@@ -201,14 +201,19 @@ impl Network {
 
     /// The network in which the edges that are keys are tunnels: itself where there are none.
     pub(crate) fn with_tunnels<T>(&self, edges: &BTreeMap<u32, T>) -> Cow<'_, Self> {
+        self.with_storey(edges.keys().copied(), Storey::Tunnel(-1))
+    }
+
+    /// The network in which some edges lie on another storey: itself where there are none.
+    pub(crate) fn with_storey(&self, others: impl IntoIterator<Item = u32>, storey: Storey) -> Cow<'_, Self> {
         let mut network = Cow::Borrowed(self);
-        let mut tunnels: BTreeMap<u32, u32> = BTreeMap::new();
-        for &edge in edges.keys() {
+        let mut moved: BTreeMap<u32, u32> = BTreeMap::new();
+        for edge in others {
             let Self { edges, ways, .. } = network.to_mut();
             let way = &mut edges[edge as usize].way;
-            *way = *tunnels.entry(*way).or_insert_with(|| {
+            *way = *moved.entry(*way).or_insert_with(|| {
                 let of = ways[*way as usize];
-                ways.push(WayOf { traits: Traits { storey: Storey::Tunnel(-1), ..of.traits }, ..of });
+                ways.push(WayOf { traits: Traits { storey, ..of.traits }, ..of });
                 ways.len() as u32 - 1
             });
         }

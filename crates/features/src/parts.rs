@@ -87,7 +87,7 @@ pub fn channels(network: &Network, fallen: &Fallen) -> Vec<Strand> {
 }
 
 /// What decks cross: every piece of channels and shores, as its class says.
-pub fn water(strands: &[Strand]) -> Vec<Water> {
+pub fn water<'a>(strands: impl IntoIterator<Item = &'a Strand>) -> Vec<Water> {
     let mut water = Vec::new();
     for strand in strands {
         let kind = match strand.role {

@@ -104,6 +104,31 @@ pub(crate) fn clear(
     }
 }
 
+/// The longest bridge that is laid on the ground where it lies below a stream that it crosses, in quanta: 40 m.
+const SHORT_MAX: i32 = 40 * 128;
+
+/// Edges of short bridges that have come to lie below a stream that they cross, as where the DEM has the stream on its
+/// bank: a deck there would stand as a wall across its own road, where the stream passes well in a culvert.
+pub(crate) fn drowned(network: &Network, heights: &[i32], streams: &[Water], remarks: &mut [Remark]) -> BTreeSet<u32> {
+    let length = |passage: &Passage| passage.edges.iter().map(|edge| network.edges[*edge as usize].length).sum::<i32>();
+    let mut decks = passages(network);
+    decks.retain(|passage| passage.is_deck && length(passage) <= SHORT_MAX);
+    let belows = Belows { network, water: streams };
+    let mut edges = BTreeSet::new();
+    for over in overs(network, &decks, streams).into_iter().filter(|over| over.passes) {
+        let crossing = network.segment(over.edge).crossing(&belows.segment(over.below));
+        let is_below = |place| belows.height(heights, over.edge, place) < belows.height(heights, over.below, place);
+        if belows.water(over.below).is_some() && crossing.is_some_and(is_below) {
+            edges.extend(&decks[over.passage as usize].edges);
+        }
+    }
+    let ids: BTreeSet<_> =
+        edges.iter().map(|edge| network.ways[network.edges[*edge as usize].way as usize].id).collect();
+    let too_low = |remark: &&mut Remark| ids.contains(&remark.id) && matches!(remark.flaw, Flaw::ClearanceLacks { .. });
+    remarks.iter_mut().filter(too_low).for_each(|remark| remark.remedy = Remedy::Culvert);
+    edges
+}
+
 /// All decks over all that they may have to clear.
 fn overs(network: &Network, decks: &[Passage], water: &[Water]) -> Vec<Over> {
     let belows = Belows { network, water };

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::FeatureId;
+use crate::{FeatureId, Tolerance};
 
 /// What was wrong.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -276,7 +276,10 @@ pub enum Remedy {
 impl fmt::Display for Remedy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Remedy::Coarser { times } => return write!(f, "thinned with {times} times the tolerance"),
+            Remedy::Coarser { times } => {
+                let aside_m = Tolerance::USUAL.aside_m * f64::from(*times);
+                return write!(f, "thinned with {times} times the tolerance, up to {aside_m:.0} m aside");
+            }
             Remedy::LeftOut => "left out",
             Remedy::PartLeftOut => "left out in part",
             Remedy::PointLeftOut => "the point was left out",

@@ -5,12 +5,9 @@ use std::collections::HashMap;
 use terrain::{QUANTA_PER_METRE, Role, SideSlope};
 
 use crate::forms::Formed;
-use crate::toes::{CUT_RUN, FILL_RUN};
+use crate::toes::{CUT_RUN, FILL_RUN, ROADSIDE_REACH_M};
 use crate::watersides::moved_beside;
 use crate::{Graded, Place};
-
-/// Metres from the edge of a road beyond which no slope reaches.
-pub const ROADSIDE_REACH_M: f64 = 60.0;
 
 /// Metres along the side of a cell in which known ground is looked up: stations stand closer.
 const CELL_M: f64 = 32.0;

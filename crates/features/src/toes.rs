@@ -15,6 +15,9 @@ pub const CUT_RUN: f64 = 1.5;
 /// Run over rise of a fill.
 pub const FILL_RUN: f64 = 2.0;
 
+/// Metres from the edge of a road beyond which no slope reaches.
+pub const ROADSIDE_REACH_M: f64 = 60.0;
+
 /// A slope reaches no farther from the edge of its strip than this many widths.
 const WIDTHS_MAX: f64 = 2.0;
 
