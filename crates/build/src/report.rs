@@ -85,7 +85,7 @@ impl Findings<'_> {
             refusals: refusals(&refused),
             bound,
             stops: self.stops(),
-            warnings: run.warnings(),
+            warnings: run.warnings()?,
             outdated: false,
             tiles: Vec::new(),
             files: BTreeMap::new(),

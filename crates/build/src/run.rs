@@ -216,7 +216,10 @@ impl Run<'_> {
     }
 
     /// What a person should know of what the run was made from.
-    pub fn warnings(&self) -> Vec<String> {
+    ///
+    /// # Errors
+    /// When what features put into a tile cannot be read.
+    pub fn warnings(&self) -> Result<Vec<String>, CompileError> {
         let of_features = self.level.iter().flat_map(|settled| &settled.level.notes);
         let fewer = match self.job.tin.budget {
             PointBudget::Points(asked) => Some((asked, self.points_beside_features(asked))),
@@ -228,7 +231,8 @@ impl Run<'_> {
                  limits.mean_per_load_module"
             )
         });
-        self.ground.warnings.iter().chain(of_features).cloned().chain(fewer).collect()
+        let not_taken = self.ground.given_on_features(&self.area, &self.job.class_names())?;
+        Ok(self.ground.warnings.iter().chain(of_features).cloned().chain(fewer).chain(not_taken).collect())
     }
 
     /// Of so many points that a job asks for, those that the limit of the area leaves room for beside features. Without

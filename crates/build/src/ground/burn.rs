@@ -50,7 +50,8 @@ pub fn burn(window: Window, features: &TileFeatures, (spacing, left_out_weight):
         class_of[index].is_some() || (is_changed(post) && !is_shaped[index])
     };
     let featured = rect.posts().filter(is_featured).collect();
-    Window { dem, importance, featured, ..window }
+    let decided = rect.posts().filter(|post| class_of[rect.index(*post)].is_some()).collect();
+    Window { dem, importance, featured, decided, ..window }
 }
 
 /// Posts on features weigh nothing and have the class of the feature, also where a lake closes a hole. Posts on what is

@@ -123,6 +123,38 @@ impl Given {
         }))
     }
 
+    /// Which heights that files give lie on roads or in water, whose own heights hold: the first, and how many.
+    /// `class_at` tells the class of the feature at a post of a tile.
+    ///
+    /// # Errors
+    /// Those of `class_at`.
+    pub fn on_features<E>(
+        &self,
+        area: &GamingArea,
+        names: &[String],
+        class_at: impl Fn(TileId, Post) -> Result<Option<u8>, E>,
+    ) -> Result<Option<String>, E> {
+        let (mut first, mut count) = (None, 0);
+        for told in self.heights.iter().filter(|told| !(self.outer_is_fixed && area.rect.has_on_border(told.at))) {
+            let Some(&tile) = area.tiles.iter().find(|&&tile| area.tiling.rect(tile).contains(told.at)) else {
+                continue;
+            };
+            if let Some(class) = class_at(tile, told.at)? {
+                count += 1;
+                first.get_or_insert((told, class));
+            }
+        }
+        Ok(first.map(|(told, class)| {
+            let name = names.get(usize::from(class)).map_or("a class", String::as_str);
+            let others = if 1 < count { format!("; {count} such heights in all") } else { String::new() };
+            format!(
+                "{}: a height of {:.2} m lies on {name}, whose own height holds there{others}",
+                told.place,
+                metres_of_quanta(told.quanta)
+            )
+        }))
+    }
+
     /// Keeps in mind a post that a file gives.
     fn add(&mut self, path: &Path, feature: &GivenFeature, post: GivenPost) {
         let place = || format!("{}: {}", path.display(), feature.place);

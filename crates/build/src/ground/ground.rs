@@ -16,7 +16,7 @@ use crate::ground::area::{GamingArea, stretched};
 use crate::ground::burn::burn;
 use crate::ground::census::Census;
 use crate::ground::excluded::GamingAreaFrame;
-use crate::ground::given::Given;
+use crate::ground::given::{Given, GivenPost};
 use crate::ground::large::WHOLE_BYTES_MAX;
 use crate::ground::mask_of::{Fault, Opening};
 use crate::ground::relief::{Bounds, Relief};
@@ -176,9 +176,26 @@ impl Ground {
     }
 
     fn with_given(&self, area: &GamingArea, tile: TileId, window: Window) -> Result<Window, GroundError> {
-        let given = self.given.of_tile(area, tile, &window.dem)?;
+        let mut given = self.given.of_tile(area, tile, &window.dem)?;
+        // An area meets its neighbour at its outer border, whatever crosses it.
+        let is_decided = |post: &GivenPost| !post.outer && window.decided.binary_search(&post.at).is_ok();
+        given.iter_mut().filter(|post| is_decided(post)).for_each(|post| post.height = None);
         let place = GamingAreaFrame { rect: self.rect, frame: self.frame };
         Ok(Window { given, forbidden: self.given.forbidden(&place, area.tiling.rect(tile)), ..window })
+    }
+
+    /// What a person should know of heights that a job gives on its roads and in its water, which are not taken; the
+    /// classes of `names`.
+    ///
+    /// # Errors
+    /// When the source has no heights there, or features cannot be read.
+    pub fn given_on_features(&self, area: &GamingArea, names: &[String]) -> Result<Option<String>, GroundError> {
+        let class_at = |tile: TileId, post: Post| -> Result<Option<u8>, GroundError> {
+            let window = self.tile(area, tile)?;
+            let is_decided = window.decided.binary_search(&post).is_ok();
+            Ok(is_decided.then(|| window.importance.class(post)))
+        };
+        if self.lines.get().is_none() { Ok(None) } else { self.given.on_features(area, names, class_at) }
     }
 
     /// What heights lie within: those of the sources, and what the job says itself of water.

@@ -19,12 +19,14 @@ pub struct Window {
     pub forbidden: Vec<Post>,
     /// Posts that features lie on, or whose heights they have changed; in ascending order.
     pub featured: Vec<Post>,
+    /// Those of them that lie on a road or in water, whose height stands whatever the job gives there.
+    pub decided: Vec<Post>,
 }
 
 impl Window {
     /// Heights and weights of a rectangle.
     pub(crate) fn of(dem: Dem, importance: Importance) -> Self {
-        Self { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new() }
+        Self { dem, importance, given: Vec::new(), forbidden: Vec::new(), featured: Vec::new(), decided: Vec::new() }
     }
 
     /// One window of several that cover it together and agree about the posts that they share.
@@ -52,7 +54,7 @@ impl Window {
     /// The key of what is made from this window, with the window's own parts in it.
     pub fn key(&self, purpose: &'static str) -> Key {
         // What features have changed shows in heights and weights.
-        let Self { dem, importance, given, forbidden, featured: _ } = self;
+        let Self { dem, importance, given, forbidden, featured: _, decided: _ } = self;
         Key::new(purpose)
             .part(HEIGHTS, |part| feed_heights(part, dem))
             .part(WEIGHTS, |part| feed_weights(part, importance))

@@ -5,7 +5,8 @@ use features::Kind;
 use store::Folder;
 use terrain::Role;
 
-use super::drawing::{At, Drawing, Drawn, Laid, SIDE_M, line};
+use super::drawing::{At, Drawing, Drawn, Laid, SIDE_M, line, polygon};
+use crate::given::write_pins;
 use crate::scene::Words;
 
 /// The fall across a road at a place, between points so far to the left and to the right.
@@ -26,6 +27,22 @@ fn a_road_across_a_side_slope_of_thirty_percent_is_level_across() {
         assert_eq!(laid.class(at), "primary");
         assert_eq!(laid.class((place, at.1 + 40.0)), "default");
     }
+}
+
+#[test]
+fn heights_of_pins_on_roads_and_in_water_are_not_taken_and_told() {
+    let shore = [(1200.0, 1200.0), (1600.0, 1200.0), (1600.0, 1600.0), (1200.0, 1600.0)];
+    let drawn = [line("highway=primary", &[(0.0, 900.0), (SIDE_M, 900.0)]), polygon("natural=water", &shore)];
+    let words = Words { tin: "pins = \"pins.geojson\"".into(), ..Drawing::words() };
+    let drawing = Drawing::of(words, |_, _| 500.0, &drawn);
+    let height = |row, col| ("height", row, col, r#","height_m":505"#);
+    write_pins(&drawing.scene.path("pins.geojson"), &[height(36, 33), height(56, 56), height(20, 20)]);
+    let warnings = drawing.scene.build("area.tdb", 2).report.warnings;
+    let [told] = &warnings[..] else { panic!("expected one warning: {warnings:?}") };
+    assert!(told.contains("pins.geojson: feature 0: a height of 505.00 m lies on primary"), "{told}");
+    assert!(told.ends_with("; 2 such heights in all"), "{told}");
+    let laid = drawing.built();
+    assert_eq!([(825.0, 900.0), (1400.0, 1400.0), (500.0, 500.0)].map(|at| laid.height(at)), [500.0, 500.0, 505.0]);
 }
 
 #[test]
@@ -140,10 +157,7 @@ fn bow_ties_doubles_and_gaps_are_mended_and_told() {
         line("highway=track", &[(900.0, 100.0), (100.0, 100.0)]),
         line("highway=track", &[(900.4, 100.0), (1500.0, 400.0)]),
         line("highway=track", &[(300.0, 600.0), (300.0, 600.0)]),
-        super::drawing::polygon(
-            "natural=water",
-            &[(1000.0, 1000.0), (1400.0, 1400.0), (1400.0, 1000.0), (1000.0, 1400.0)],
-        ),
+        polygon("natural=water", &[(1000.0, 1000.0), (1400.0, 1400.0), (1400.0, 1000.0), (1000.0, 1400.0)]),
     ];
     let laid = Drawing::new(|east, _| 500.0 + 0.01 * east, &drawn).built();
     for words in ["copy of another", "misses another way", "ring crosses itself"] {
