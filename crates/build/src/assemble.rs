@@ -148,7 +148,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     }
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
     let at_source = at_source(run, tile, &modules)?;
-    let figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
+    let mut figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
     // Coarser levels are made of vertices of the TIN: those that lowered the ground onto decks are none.
     swap_grounds(&mut modules, &mut bare);
     let mut levels = all_levels(run, modules, (&layout, &window.dem, &natural.importance), &features);
@@ -156,6 +156,9 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     levels[1..].iter_mut().for_each(|level| lift(level, &decks));
     levels[1..].iter_mut().for_each(|level| drop(fidelity::measure(level, &window.measured(area))));
     place_objects(run, stamps, &mut levels, objects.as_ref(), &layout)?;
+    if let Some(figures) = &mut figures {
+        figures.in_buildings_m = levels[0].iter().map(fidelity::metres_in_buildings).sum();
+    }
     let file = publish(run, tile, &layout, fingerprint, &levels)?;
     let counted = count_points(run, &own.tin, &removed[area.tiling.index(tile)], &window.importance);
     let ground = (heights_of(&levels), curvature(run, tile, &levels[0], &window));

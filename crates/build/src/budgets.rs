@@ -11,11 +11,12 @@ use features::{AreaFeatures, Formed, Kind, Levelled};
 use job::Job;
 use schedule::Workers;
 use store::Profile;
-use terrain::{LineStorey, TileId};
+use terrain::{LineStorey, QUANTA_PER_METRE, TileId};
 
 use crate::CompileError;
 use crate::level::shares;
 use crate::pieces::cost_of;
+use crate::product::WIDE_MIN;
 use crate::profile::sound;
 use crate::read_features::{Heard, ReadFeatures};
 use crate::run::Run;
@@ -40,6 +41,8 @@ pub struct Budgeted {
     pub per_window: u32,
     /// Metres of ways by kind, in the table's order: kept, and all there are, tunnels not among them.
     pub kinds: Vec<(Kind, [f64; 2])>,
+    /// Metres of motorways, primaries and rails in the ground: those that have their width, and those that are to.
+    pub wide_m: [f64; 2],
     /// Lakes of 1 ha and more: kept, and all there are.
     pub lakes: [u32; 2],
     /// Triangles that features would take.
@@ -47,19 +50,21 @@ pub struct Budgeted {
 }
 
 impl Budgeted {
-    /// Whether it keeps nearly all: 99.5 % of motorways, primaries, rails and rivers, 95 % of every other kind, and
-    /// every lake of 1 ha.
+    /// Whether it keeps nearly all: 99.5 % of motorways, primaries, rails and rivers, 95 % of every other kind, the
+    /// width of 95 % of main ways, and every lake of 1 ha.
     pub fn holds(&self) -> bool {
         let enough = |&(kind, [kept, all]): &(Kind, [f64; 2])| {
             let is_main = matches!(kind, Kind::Motorway | Kind::Primary | Kind::Rail | Kind::River);
             KEPT_MIN[usize::from(!is_main)] * all <= kept
         };
-        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(enough)
+        let [wide, all] = self.wide_m;
+        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(enough) && WIDE_MIN * all <= wide
     }
 
-    /// Whether it keeps all there is.
+    /// Whether it keeps all there is, main ways in their width.
     pub fn is_whole(&self) -> bool {
-        self.lakes[0] == self.lakes[1] && self.kinds.iter().all(|(_, [kept, all])| all - kept < 1.0)
+        let [wide, all] = self.wide_m;
+        self.lakes[0] == self.lakes[1] && all - wide < 1.0 && self.kinds.iter().all(|(_, [kept, all])| all - kept < 1.0)
     }
 
     /// Metres of all kinds for which `picked` says so: kept, and all there are.
@@ -117,7 +122,11 @@ impl Budgets {
         let lakes = reserved.amounts.values();
         let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
         let triangles = reserved.cost.values().flat_map(BTreeMap::values).map(|&count| u64::from(count)).sum();
-        Ok(Budgeted { mean, per_load_module, per_window, kinds: self.kinds(&reserved.formed), lakes, triangles })
+        let metres = |quanta: i64| quanta as f64 / f64::from(QUANTA_PER_METRE);
+        let main = reserved.amounts.values().filter(|of| of.is_main);
+        let wide = main.fold([0; 2], |[wide, all], of| [wide + of.wide[1], all + of.wide[0]]);
+        let (kinds, wide_m) = (self.kinds(&reserved.formed), wide.map(metres));
+        Ok(Budgeted { mean, per_load_module, per_window, kinds, wide_m, lakes, triangles })
     }
 
     /// Triangles of each load module that features take within the limits of the job itself, row by row.

@@ -336,6 +336,7 @@ fn amounts(reserved: &Reserved, classes: &[u8]) -> Vec<FeatureAmounts> {
         class: classes[usize::from(*class)],
         wanted_m: metres(amounts.wanted),
         kept_m: metres(amounts.kept),
+        wide_m: amounts.wide.map(metres),
         is_main: amounts.is_main,
         lakes_wanted: amounts.lakes_wanted,
         lakes_kept: amounts.lakes_kept,

@@ -48,6 +48,8 @@ pub struct Amounts {
     pub wanted: i64,
     /// Those of them that are in the ground.
     pub kept: i64,
+    /// Those of these that are to have their width, and those that have it.
+    pub wide: [i64; 2],
     /// Whether it is of a kind that may use the larger share of limits.
     pub is_main: bool,
     /// Bodies of water of a hectare and more.
@@ -143,13 +145,21 @@ impl Reserved {
                 Some(LeftOut { class: of.class, id, why, length: of.length, lines })
             })
             .collect();
-        for (of, way) in choice.stretches.all.iter().zip(&chosen.ways).filter(|(of, _)| of.is_inside) {
+        for ((stretch, of), way) in (0..).zip(&choice.stretches.all).zip(&chosen.ways) {
+            if !of.is_inside {
+                continue;
+            }
             let amounts = reserved.amounts.entry(of.class).or_default();
             let is_way = of.doubled_area == 0;
             amounts.is_main |= of.is_main(choice.site);
             if is_way {
                 amounts.wanted += of.length;
-                amounts.kept += if way.is_ok() { of.length } else { 0 };
+                let Ok(way) = way else { continue };
+                amounts.kept += of.length;
+                if Way::STRIP <= choice.form_most_of(stretch) {
+                    amounts.wide[0] += of.length;
+                    amounts.wide[1] += if Way::STRIP <= way.form { of.length } else { 0 };
+                }
             } else if of.kind == Kind::Lake && of.is_main(choice.site) {
                 amounts.lakes_wanted += 1;
                 amounts.lakes_kept += u32::from(way.is_ok());

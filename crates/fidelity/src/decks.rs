@@ -40,6 +40,12 @@ pub struct DeckFigures {
     /// The highest step onto a deck: how far a corner stands above the end of its bridge's line, where that ends on the
     /// ground, and above the ground under it, in quanta.
     pub step: u32,
+    /// How steep a triangle of a deck is at most, of a square metre and more, in thousandths.
+    pub steepest: u32,
+    /// Ends of bridges from which no way goes on and which hang above the ground.
+    pub hanging: u64,
+    /// How far one does at most, in quanta.
+    pub hangs: u32,
 }
 
 impl DeckFigures {
@@ -65,6 +71,11 @@ impl DeckFigures {
             figures.add_clearance(class, height);
         }
         figures.step = highest_step(module);
+        figures.steepest = steepest(module);
+        for height in hanging(module) {
+            figures.hanging += 1;
+            figures.hangs = figures.hangs.max(height);
+        }
         figures.under = above.iter().filter(|above| ROUNDING < -above.floor() as i32).count() as u64;
         if 0 < figures.under {
             figures.deepest = deepest(module);
@@ -78,6 +89,9 @@ impl DeckFigures {
         self.under += other.under;
         self.deepest = self.deepest.max(other.deepest);
         self.step = self.step.max(other.step);
+        self.steepest = self.steepest.max(other.steepest);
+        self.hanging += other.hanging;
+        self.hangs = self.hangs.max(other.hangs);
         other.clearance.iter().for_each(|(&class, &least)| self.add_clearance(class, least));
     }
 
@@ -148,6 +162,39 @@ fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
         }
     }
     found
+}
+
+/// How steep a triangle of a deck is at most, in thousandths. Those of less than a square metre are slivers.
+fn steepest(module: &LoadModule) -> u32 {
+    let slope = |triangle: &[u16; 3]| {
+        let corners = triangle.map(|corner| Segment::place(&module.decks.vertices[usize::from(corner)]));
+        let [[ux, uy, uz], [vx, vy, vz]] =
+            [1, 2].map(|other| [0, 1, 2].map(|axis| corners[other][axis] - corners[0][axis]));
+        let doubled = ux * vy - uy * vx;
+        let [east, north] = [uz * vy - uy * vz, ux * vz - uz * vx];
+        let is_large = 2.0 * f64::from(SAMPLE * SAMPLE) <= doubled.abs();
+        is_large.then(|| (1000.0 * east.hypot(north) / doubled.abs()).round() as u32)
+    };
+    module.decks.triangles.iter().filter_map(slope).max().unwrap_or(0)
+}
+
+/// How far above the ground bridges end, in quanta, from which no other kept line goes on: what leads on there is not
+/// in the data, or of a kind that is not read.
+fn hanging(module: &LoadModule) -> Vec<u32> {
+    let is_inside = |vertex: &ModuleVertex| [vertex.x, vertex.y].iter().all(|at| (1..module.side).contains(at));
+    let kept = || module.lines.iter().filter(|line| line.traits.is_kept);
+    let ends = |line: &ModuleLine| line.vertices.first().into_iter().chain(line.vertices.last()).copied().collect();
+    let bridges = kept().filter(|line| line.traits.storey == LineStorey::Bridge);
+    let ends: Vec<ModuleVertex> = bridges.flat_map(|line| -> Vec<ModuleVertex> { ends(line) }).collect();
+    let goes_on = |end: &ModuleVertex| {
+        let at = |vertex: &&ModuleVertex| [vertex.x, vertex.y] == [end.x, end.y];
+        1 < kept().filter(|line| line.vertices.iter().any(|vertex| at(&vertex))).count()
+    };
+    let hangs = |end: &ModuleVertex| {
+        let height = f64::from(end.z) - ground_under(module, end);
+        (ON_GROUND < height).then_some(height as u32)
+    };
+    ends.iter().filter(|end| is_inside(end) && !goes_on(end)).filter_map(hangs).collect()
 }
 
 /// The highest step onto a deck: of corners beside an end of a bridge's line, where that ends on the ground. One beside
@@ -338,6 +385,27 @@ mod tests {
             DeckFigures::of(&module).step
         };
         assert_eq!([0, 20, 64].map(step), [200, 180, 0], "the last ends in the air");
+    }
+
+    #[test]
+    fn a_bridge_that_ends_in_the_air_is_told_where_no_way_goes_on() {
+        let ends = |south: i32, goes_on: bool| {
+            let mut module = module([200, 100, 0, 0]);
+            module.lines = vec![line(3, LineStorey::Bridge, &[(4300, 5000, south), (4300, 7560, 0)])];
+            if goes_on {
+                module.lines.push(line(3, LineStorey::Ground, &[(4300, 5000, south), (4300, 3000, south)]));
+            }
+            let figures = DeckFigures::of(&module);
+            (figures.hanging, figures.hangs)
+        };
+        assert_eq!([ends(20, false), ends(64, false), ends(64, true)], [(0, 0), (1, 64), (0, 0)]);
+    }
+
+    #[test]
+    fn the_steepest_triangle_of_a_deck_is_found_and_slivers_are_not() {
+        let steepest = |heights: [i32; 4]| DeckFigures::of(&module(heights)).steepest;
+        assert_eq!(steepest([256; 4]), 0);
+        assert!(0 < steepest([256, 256, 768, 768]));
     }
 
     #[test]

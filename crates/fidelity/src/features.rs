@@ -33,6 +33,8 @@ pub struct FeatureFigures {
     pub outside: Tally,
     /// How far decks stand above the ground.
     pub decks: DeckFigures,
+    /// Metres of roads that lie inside buildings, counted once these stand on the ground.
+    pub in_buildings_m: u64,
 }
 
 impl FeatureFigures {
@@ -58,6 +60,7 @@ impl FeatureFigures {
             shore_below,
             outside: residuals_without(modules, ground, featured),
             decks: deck_figures(modules),
+            in_buildings_m: 0,
         }
     }
 
@@ -74,6 +77,7 @@ impl FeatureFigures {
         self.shore_below += other.shore_below;
         self.outside.merge(&other.outside);
         self.decks.merge(&other.decks);
+        self.in_buildings_m += other.in_buildings_m;
     }
 }
 

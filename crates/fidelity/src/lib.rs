@@ -31,6 +31,8 @@ mod split;
 pub use split::{Split, best_split};
 mod source;
 pub use source::{PushRow, SourcePosts, residuals_at_source};
+mod buildings;
+pub use buildings::metres_in_buildings;
 mod decks;
 pub use decks::DeckFigures;
 mod places;

@@ -153,7 +153,7 @@ impl Choice for Form {
     /// Polygons have no word: shapes and tags say what is one.
     const WORDS: &'static [Word<Self>] = &[
         Word::new("line", Self::Line, "the centreline: about 2 triangles a station"),
-        Word::new("auto", Self::Strip, "a strip where the ground falls by more than 0.5 m across, else a line"),
+        Word::new("auto", Self::Strip, "a strip over the whole of a road where limits leave room, else a line"),
         Word::new("strip", Self::StripAlways, "both edges, level across: about 4 triangles a station"),
         Word::new("bench", Self::Bench, "a strip, and where its slopes meet the ground: about 8 triangles a station"),
     ];

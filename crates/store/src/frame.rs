@@ -53,14 +53,15 @@ impl Kind {
     /// Version of its files. Files of another one are made again.
     fn version(self) -> u32 {
         match self {
-            // 2: how much the ground curves; 3: residuals against the sources alone; 4: steps onto decks.
-            Kind::Measured => 4,
+            // 2: how much the ground curves; 3: residuals against the sources alone; 4: steps onto decks; 5: steep
+            // decks, and such as end in the air.
+            Kind::Measured => 5,
             // 2: corners as steps from one to the next.
             Kind::Buildings => 2,
             // 2: nothing over holes.
             Kind::Profile => 2,
-            // 2: what lies over holes.
-            Kind::Level => 2,
+            // 2: what lies over holes; 3: what has its width.
+            Kind::Level => 3,
             Kind::Tile | Kind::Curve | Kind::Removals | Kind::Lines | Kind::Objects => 1,
         }
     }

@@ -66,6 +66,8 @@ pub struct FeatureAmounts {
     pub wanted_m: f64,
     /// Those of them that are in the ground.
     pub kept_m: f64,
+    /// Those of these that are to have their width, and those that have it.
+    pub wide_m: [f64; 2],
     /// Whether it is of a kind that may use the larger share of limits.
     pub is_main: bool,
     /// Bodies of water of a hectare and more.
@@ -245,6 +247,7 @@ mod tests {
                 class: 3,
                 wanted_m: 1250.5,
                 kept_m: 0.25,
+                wide_m: [0.25, 0.0],
                 is_main: true,
                 lakes_wanted: 2,
                 lakes_kept: 1,

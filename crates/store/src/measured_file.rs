@@ -73,6 +73,11 @@ pub struct MeasuredFeatures {
     /// Places of decks that were looked at, those with ground above them, how far it is at most, and the highest step
     /// onto a deck where its bridge ends, both in quanta.
     pub decks: (u64, u64, u32, u32),
+    /// How steep a deck is at most, in thousandths, ends of bridges that hang above the ground, and how far one does at
+    /// most, in quanta.
+    pub deck_ends: (u32, u64, u32),
+    /// Metres of roads that lie inside buildings.
+    pub in_buildings_m: u64,
     /// The least height of decks above what they cross of each class, in quanta.
     pub deck_clearance: Vec<(u8, i32)>,
 }

@@ -177,6 +177,18 @@ pub struct ReportFeatureChecks {
     /// ground, in metres.
     #[serde(default)]
     pub deck_step_max_m: f64,
+    /// How steep a triangle of a deck is at most, of a square metre and more, in per cent.
+    #[serde(default)]
+    pub deck_slope_max_percent: f64,
+    /// Ends of bridges from which no way goes on, and which hang more than 0.25 m above the ground.
+    #[serde(default)]
+    pub deck_ends_hanging: u64,
+    /// How far one of them does at most, in metres.
+    #[serde(default)]
+    pub deck_end_hangs_max_m: f64,
+    /// Metres of roads in the ground that lie inside buildings.
+    #[serde(default)]
+    pub roads_in_buildings_m: u64,
 }
 
 /// How low decks pass over one class of ways or water.

@@ -136,11 +136,21 @@ pub(crate) fn check_rows(checks: &ReportFeatureChecks) -> Vec<(&'static str, Str
         ("posts of shores below water", of(checks.shore_posts_below, checks.shore_posts)),
         ("square metres of decks under ground", under_ground(checks)),
         ("highest step onto a deck", format!("{:.2} m", checks.deck_step_max_m)),
+        ("steepest deck", format!("{:.0} %", checks.deck_slope_max_percent)),
+        ("ends of bridges in the air", hanging(checks)),
+        ("metres of roads inside buildings", grouped(checks.roads_in_buildings_m)),
         (
             "residual outside features",
             format!("RMS {:.3} m, largest {:.2} m", checks.outside_rms_m, checks.outside_max_m),
         ),
     ]
+}
+
+fn hanging(checks: &ReportFeatureChecks) -> String {
+    match checks.deck_ends_hanging {
+        0 => "0".into(),
+        ends => format!("{}, by {:.2} m at most", grouped(ends), checks.deck_end_hangs_max_m),
+    }
 }
 
 fn under_ground(checks: &ReportFeatureChecks) -> String {

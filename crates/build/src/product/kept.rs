@@ -38,7 +38,7 @@ pub(crate) fn from_curvature(MeasuredCurvature { cells, integral, rough_cells }:
 /// What is kept of the figures of features.
 pub(crate) fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
     let FeatureFigures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = figures;
-    let FeatureFigures { lake_banks_m2, outside, decks, .. } = figures;
+    let FeatureFigures { lake_banks_m2, outside, decks, in_buildings_m, .. } = figures;
     MeasuredFeatures {
         steps_per_post: *steps_per_post,
         edges: *edges,
@@ -49,6 +49,8 @@ pub(crate) fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
         shore_below: *shore_below,
         outside: to_tally(outside),
         decks: (decks.samples, decks.under, decks.deepest, decks.step),
+        deck_ends: (decks.steepest, decks.hanging, decks.hangs),
+        in_buildings_m: *in_buildings_m,
         deck_clearance: decks.clearance.iter().map(|(&class, &least)| (class, least)).collect(),
     }
 }
@@ -57,7 +59,7 @@ pub(crate) fn to_features(figures: &FeatureFigures) -> MeasuredFeatures {
 pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
     let MeasuredFeatures { steps_per_post, edges, missing, lake_spread, shore_posts, shore_below, .. } = measured;
     let &MeasuredFeatures { decks: (samples, under, deepest, step), ref deck_clearance, ref outside, .. } = measured;
-    let MeasuredFeatures { lake_banks_m2, .. } = measured;
+    let &MeasuredFeatures { lake_banks_m2, deck_ends: (steepest, hanging, hangs), in_buildings_m, .. } = measured;
     let clearance = deck_clearance.iter().copied().collect();
     let ends =
         |&[row, col, to_row, to_col]: &[i32; 4]| [LatticePoint::new(row, col), LatticePoint::new(to_row, to_col)];
@@ -66,11 +68,12 @@ pub fn from_features(measured: &MeasuredFeatures) -> FeatureFigures {
         edges: *edges,
         missing: missing.iter().map(ends).collect(),
         lake_spread: *lake_spread,
-        lake_banks_m2: *lake_banks_m2,
+        lake_banks_m2,
         shore_posts: *shore_posts,
         shore_below: *shore_below,
         outside: from_tally(outside),
-        decks: DeckFigures { samples, under, deepest, clearance, step },
+        decks: DeckFigures { samples, under, deepest, clearance, step, steepest, hanging, hangs },
+        in_buildings_m,
     }
 }
 
@@ -84,7 +87,17 @@ mod tests {
         figures.missing = vec![[LatticePoint::new(1, -2), LatticePoint::new(3, 4)]];
         (figures.shore_posts, figures.shore_below, figures.lake_banks_m2) = (7, 2, 5);
         figures.outside.add(-17);
-        figures.decks = DeckFigures { samples: 9, under: 1, deepest: 5, clearance: [(2, -5)].into(), step: 3 };
+        figures.decks = DeckFigures {
+            samples: 9,
+            under: 1,
+            deepest: 5,
+            clearance: [(2, -5)].into(),
+            step: 3,
+            steepest: 70,
+            hanging: 2,
+            hangs: 40,
+        };
+        figures.in_buildings_m = 7;
         assert_eq!(from_features(&to_features(&figures)), figures);
     }
 

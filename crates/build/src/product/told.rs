@@ -183,6 +183,10 @@ fn checks(level: &AreaLevel, figures: &FeatureFigures, extent_m: [f64; 4]) -> Re
         deck_samples_under: figures.decks.under,
         deck_under_max_m: metres(figures.decks.deepest),
         deck_step_max_m: metres(figures.decks.step),
+        deck_slope_max_percent: f64::from(figures.decks.steepest) / 10.0,
+        deck_ends_hanging: figures.decks.hanging,
+        deck_end_hangs_max_m: metres(figures.decks.hangs),
+        roads_in_buildings_m: figures.in_buildings_m,
         ..ReportFeatureChecks::default()
     };
     for line in &level.lines {

@@ -47,7 +47,7 @@ pub(crate) struct Matter {
 }
 
 /// All that a build knows of what it made, in the order in which warnings are told.
-pub(crate) const MATTERS: [Matter; 23] = [
+pub(crate) const MATTERS: [Matter; 27] = [
     matter(
         "files, datums, holes and rules of sources, areas of importance, or metres of the area's system, that are not \
          as they should be",
@@ -59,6 +59,11 @@ pub(crate) const MATTERS: [Matter; 23] = [
          out for limits",
         Told::Warning(left_out),
         "networks are no longer whole; larger limits keep them, as tiefort plan tells",
+    ),
+    matter(
+        "more than 5 % of the length of a main class, and 100 m, that has no room for its width",
+        Told::Warning(without_width),
+        "it is a line and tilts as the hillside does; larger limits lay it flat across, as tiefort plan tells",
     ),
     matter(
         "more than 5 % of what objects of a kind hide left out for [objects.limits]",
@@ -101,6 +106,21 @@ pub(crate) const MATTERS: [Matter; 23] = [
         "decks below what they cross",
         Told::Warning(decks_below),
         "a bridge passes over what it crosses; which of them is the higher is wrong in the data, or the heights are",
+    ),
+    matter(
+        "a deck steeper than 50 %",
+        Told::Warning(decks_steep),
+        "its corners rise onto ground that nothing may cut away; vehicles stop there",
+    ),
+    matter(
+        "ends of bridges that hang in the air",
+        Told::Line,
+        "the way that goes on there is not in the data, or of a kind that is not read; the report counts them",
+    ),
+    matter(
+        "roads that run through buildings",
+        Told::Line,
+        "their source says of no passage, or lays one of the two beside its place; the report counts the metres",
     ),
     matter(
         "decks too low over what they cross",
@@ -189,6 +209,15 @@ fn decks_under(made: &Made) -> Vec<String> {
     (0 < checks.deck_samples_under).then(told).into_iter().collect()
 }
 
+/// Decks are too steep to be driven on.
+fn decks_steep(made: &Made) -> Vec<String> {
+    const MOST_PERCENT: f64 = 50.0;
+    let Some(checks) = made.report.features.as_ref().map(|features| &features.checks) else { return Vec::new() };
+    let steepest = checks.deck_slope_max_percent;
+    let told = || format!("a deck rises by {steepest:.0} %: its corners stand on ground that nothing may cut away");
+    (MOST_PERCENT < steepest).then(told).into_iter().collect()
+}
+
 /// Bridges lie lower than the ways and the water that they cross.
 fn decks_below(made: &Made) -> Vec<String> {
     let all = made.report.features.iter().flat_map(|features| &features.deck_clearances);
@@ -255,6 +284,10 @@ fn through_hills(made: &Made) -> Vec<String> {
     (0.0 < metres).then(told).into_iter().collect()
 }
 
+/// The share of the length of a main class in the ground that is to have its width: a line takes the tilt of the
+/// hillside that it runs along.
+pub(crate) const WIDE_MIN: f64 = 0.95;
+
 /// The share of a main class that may be left out without a warning, and that of all ways.
 const LEFT_OUT_MAX: [f64; 2] = [0.01, 0.1];
 
@@ -290,6 +323,27 @@ fn left_out_of(job: &Job, level: &AreaLevel) -> Vec<String> {
         warnings.push(format!("{lakes} of {all} lakes of a hectare and more had no room and are left out"));
     }
     warnings
+}
+
+/// Main ways are lines for want of room.
+fn without_width(made: &Made) -> Vec<String> {
+    const LEAST_M: f64 = 100.0;
+    let Some((job, level)) = made.features else { return Vec::new() };
+    let names = job.class_names();
+    let narrow = level.amounts.iter().filter(|of| of.is_main && of.wide_m[1] < WIDE_MIN * of.wide_m[0]);
+    let narrow = narrow.filter(|of| LEAST_M < of.wide_m[0] - of.wide_m[1]);
+    let told = |of: &FeatureAmounts| {
+        let [wanted, laid] = of.wide_m;
+        let name = names.get(usize::from(of.class)).map_or("a class", String::as_str);
+        format!(
+            "{:.1} % of {name} had no room for its width and is a line, which tilts as the ground does: {:.1} of \
+             {:.1} km; tiefort plan tells which mean lays it",
+            100.0 * (wanted - laid) / wanted,
+            (wanted - laid) / 1000.0,
+            wanted / 1000.0
+        )
+    };
+    narrow.map(told).collect()
 }
 
 /// Too much of what objects hide had no room.

@@ -102,7 +102,7 @@ fn what_an_earlier_version_measured_is_measured_again_and_load_modules_are_kept(
     bytes[8] = 1;
     fs::write(&path, &bytes).unwrap();
     let problems = inspect::verify(&scene.path("area"), None).unwrap().problems;
-    assert!(problems.iter().any(|problem| problem.ends_with("found format version 1, expected 4")), "{problems:#?}");
+    assert!(problems.iter().any(|problem| problem.ends_with("found format version 1, expected 5")), "{problems:#?}");
     scene.build("area", 2);
     assert_eq!(differing(&before, &scene.product("area")), [""; 0]);
     scene.verify("area");

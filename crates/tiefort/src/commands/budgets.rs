@@ -1,5 +1,7 @@
 //! What budgets would keep of the features and objects of a job, as a table and as JSON.
 
+use std::time::{Duration, Instant};
+
 use build::{BUDGETS, Budgeted, Budgets, OBJECT_BUDGETS, ObjectBudget, ObjectBudgets};
 use job::Job;
 use serde_json::{Value, json};
@@ -7,6 +9,9 @@ use store::ObjectSums;
 use views::{Align, Table, grouped};
 
 use crate::{resources, terminal};
+
+/// How long a person waits for a table before a line says what it waits for.
+const PATIENCE: Duration = Duration::from_secs(2);
 
 /// A share of a length, in whole per cent where it is not nearly all.
 pub fn share([kept, all]: [f64; 2]) -> String {
@@ -46,7 +51,12 @@ pub fn open(job: &Job) -> Option<Budgets> {
 
 fn of_features(budgets: &Budgets) -> Vec<Budgeted> {
     let mut tried: Vec<Budgeted> = Vec::new();
+    let mut waited = Instant::now();
     for mean in BUDGETS {
+        if PATIENCE < waited.elapsed() {
+            terminal::tell(&format!("trying what a mean of {mean} triangles keeps of features"));
+            waited = Instant::now();
+        }
         tried.extend(budgets.of_mean(mean));
         if tried.last().is_some_and(Budgeted::is_whole) {
             break;
@@ -55,24 +65,30 @@ fn of_features(budgets: &Budgets) -> Vec<Budgeted> {
     tried
 }
 
+/// The share of main ways in the ground that have their width; nothing where none is to.
+pub fn wide(of: &Budgeted) -> Option<String> {
+    (0.0 < of.wide_m[1]).then(|| share(of.wide_m))
+}
+
 /// The table; empty where there is none.
 pub fn table_text(budgets: &[Budgeted]) -> String {
     let Some(first) = budgets.first() else { return String::new() };
     let kinds: Vec<_> = first.kinds.iter().map(|(kind, _)| *kind).collect();
-    let mut table = Table::new(&vec![Align::Right; 4 + kinds.len()]);
+    let mut table = Table::new(&vec![Align::Right; 5 + kinds.len()]);
     let names = kinds.iter().map(|kind| kind.name().to_owned());
     let head = ["mean".to_owned(), "most".to_owned()].into_iter().chain(names);
-    table.row(head.chain(["lakes".to_owned(), "triangles".to_owned()]));
+    table.row(head.chain(["wide", "lakes", "triangles"].map(str::to_owned)));
     for of in budgets {
         let metres = |kind| of.kinds.iter().find(|(other, _)| *other == kind).map_or([0.0; 2], |(_, metres)| *metres);
         let row = [of.mean, of.per_load_module].map(|count| grouped(count.into()));
         let lakes = if of.lakes[1] == 0 { "-".to_owned() } else { format!("{}/{}", of.lakes[0], of.lakes[1]) };
         let shares = kinds.iter().map(|kind| share(metres(*kind)));
-        table.row(row.into_iter().chain(shares).chain([lakes, grouped(of.triangles)]));
+        table.row(row.into_iter().chain(shares).chain([wide(of).unwrap_or("-".into()), lakes, grouped(of.triangles)]));
     }
     format!(
         "\nWhat budgets would keep of features: triangles of a load module on average and at most; the kept share of \
-         the length of each kind; lakes of 1 ha and more; triangles that features take.\n{}",
+         the length of each kind, and of main roads and rails in their width; lakes of 1 ha and more; triangles that \
+         features take.\n{}",
         table.text(0)
     )
 }
@@ -90,6 +106,7 @@ pub fn table_json(budgets: &[Budgeted]) -> Value {
             "per_load_module": budget.per_load_module,
             "per_4km_square": budget.per_window,
             "kinds": kinds,
+            "main_in_width": { "kept_m": budget.wide_m[0], "all_m": budget.wide_m[1] },
             "lakes_of_1_ha": { "kept": budget.lakes[0], "all": budget.lakes[1] },
             "triangles": budget.triangles,
             "holds": budget.holds(),

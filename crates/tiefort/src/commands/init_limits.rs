@@ -7,7 +7,7 @@ use build::{BUDGETS, Budgeted, ObjectBudget, limits_of};
 use job::Job;
 use views::grouped;
 
-use crate::commands::budgets::{of_objects, open, share};
+use crate::commands::budgets::{of_objects, open, share, wide};
 use crate::commands::init_features::kept_text;
 use crate::failure::Failure;
 
@@ -61,8 +61,9 @@ impl Limits {
         for of in &self.budgets {
             let lakes =
                 if of.lakes[1] == 0 { String::new() } else { format!(", {} of {} lakes", of.lakes[0], of.lakes[1]) };
+            let wide = wide(of).map_or(String::new(), |share| format!(", {share} of main roads in their width"));
             let chosen = if of.mean == self.mean { "  (this job)" } else { "" };
-            text += &format!("#   mean {:>4}: {:>5}{lakes}{chosen}\n", of.mean, share(of.metres(|_| true)));
+            text += &format!("#   mean {:>4}: {:>5}{wide}{lakes}{chosen}\n", of.mean, share(of.metres(|_| true)));
         }
         text
     }

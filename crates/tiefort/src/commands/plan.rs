@@ -106,7 +106,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Some(Emit::Dask) => engines::dask(&glue()?),
         Some(Emit::Snakemake) => engines::snakemake(&glue()?),
         Some(Emit::Kubernetes) => engines::kubernetes(&glue()?)?,
-        None => fold(&plan_text(&job, &plan, (features.as_ref(), &Tried::of_job(&job)), &played), 2),
+        None => {
+            // What budgets keep may take longer than a build does, and all else is known before.
+            terminal::print(&fold(&known_text(&job, &plan, features.as_ref()), 2))?;
+            fold(&tried_text(&job, &plan, &Tried::of_job(&job), &played), 2)
+        }
     };
     terminal::print(&text)?;
     if !arguments.force {
@@ -135,19 +139,18 @@ fn played(job: &Job, plan: &Plan, arguments: &Arguments) -> Result<Vec<Played>, 
     Ok(tiles.iter().flat_map(|&tiles| build::play(&costs, tiles, modules, job.tiles.order, &workers)).collect())
 }
 
-fn plan_text(
-    job: &Job,
-    plan: &Plan,
-    (features, tried): (Option<&FeaturesForeseen>, &Tried),
-    played: &[Played],
-) -> String {
+fn known_text(job: &Job, plan: &Plan, features: Option<&FeaturesForeseen>) -> String {
     let mut text = format!("Settings of {}\n{}\n", job.path.display(), run::settings_text(job));
     text += &forecast_table(job, plan).text(0);
     text += &format!("\n{}", corner_table(job).text(0));
     if let Some(features) = features {
         text += &format!("\n{}", tables_text(features, job));
-        text += &budgets::table_text(&tried.features);
     }
+    text
+}
+
+fn tried_text(job: &Job, plan: &Plan, tried: &Tried, played: &[Played]) -> String {
+    let mut text = budgets::table_text(&tried.features);
     text += &budgets::objects_text(job, &tried.objects);
     if !played.is_empty() {
         text += &format!("\n{}", played_table(played).text(0));
