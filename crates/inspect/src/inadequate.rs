@@ -4,7 +4,7 @@
 //! weighted residual is above a tolerance. The second half are pins, which feed the next build.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use build::CompileError;
@@ -20,7 +20,7 @@ use terrain::{
     metres_of_quanta,
 };
 
-use crate::measures::read_modules;
+use crate::measures::{covered, read_modules};
 use crate::status::is_outdated;
 
 /// Where a database is not good enough.
@@ -34,6 +34,10 @@ pub struct Inadequate {
     pub epsg: u32,
     /// Whether some of its tiles were made from other ground than the rest, as `report.json` says.
     pub is_outdated: bool,
+    /// What it is measured against: the terrain it was built from, or rasters.
+    pub against: String,
+    /// Share of its posts at which that has a height.
+    pub covered: f64,
     /// Where its posts lie.
     pub frame: GridFrame,
     /// East and north of its south-west post, in metres.
@@ -84,13 +88,14 @@ pub struct Component {
 }
 
 /// Finds where a finished database has weighted residuals above `tolerance_m`, thrice its RMS residual where none is
-/// given.
+/// given: against the ground it was built from, or against the rasters `against` where there are some.
 ///
 /// # Errors
-/// When the database is missing, unfinished or damaged, or the ground it was built from cannot be found.
-pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate, CompileError> {
+/// When the database is missing, unfinished or damaged, or the ground cannot be found or used.
+pub fn inadequate(folder: &Path, against: &[PathBuf], tolerance_m: Option<f64>) -> Result<Inadequate, CompileError> {
     let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
-    choose_ground(&mut job, &manifest, folder.dir(), None)?;
+    let has_features = job.features.is_some();
+    let against = choose_ground(&mut job, &manifest, folder.dir(), against)?;
     locate_weights(&mut job, &manifest, folder.dir())?;
     let ground = Ground::open_built(&job, &area, (&Workers::new(1), &AtomicBool::new(false)), &folder)?;
     let window = ground.window(area.rect)?;
@@ -108,10 +113,7 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
     for &tile in &area.tiles {
         refused.extend(folder.read_tile(tile)?.1.refused.iter().map(|refusal| refusal.post));
     }
-    let far_off = match job.features {
-        Some(_) => folder.read_level()?.2.far_off,
-        None => Vec::new(),
-    };
+    let far_off = if has_features { folder.read_level()?.2.far_off } else { Vec::new() };
     let seen = Seen {
         area: &area,
         dem: &window.dem,
@@ -131,6 +133,8 @@ pub fn inadequate(folder: &Path, tolerance_m: Option<f64>) -> Result<Inadequate,
         spacing_m: frame.spacing.metres(),
         rect: area.rect,
         tolerance_m,
+        against,
+        covered: covered(&window.dem),
         frame: *frame,
         grid: area.grid,
         count: job.counted_words(),

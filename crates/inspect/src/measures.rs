@@ -1,7 +1,7 @@
 //! Fidelity of a finished database or of a plain mesh, always beside the regular grid of as many triangles.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use build::CompileError;
@@ -62,8 +62,10 @@ pub struct Fidelity {
 pub struct DatabaseFidelity {
     /// Name of the area.
     pub area: String,
-    /// What it is measured against: the terrain it was built from, or a raster.
+    /// What it is measured against: the terrain it was built from, or rasters.
     pub against: String,
+    /// Share of the posts of the area at which that has a height.
+    pub covered: f64,
     /// Whether that has features or water burned into it: never a raster that was named.
     pub is_burned: bool,
     /// Whether some of its tiles were made from other ground than the rest, as `report.json` says.
@@ -138,12 +140,12 @@ pub struct BuiltResidual {
     pub max_m: f64,
 }
 
-/// Measures the load modules of a finished database against the ground it was built from, or against the raster
-/// `against`. The heights of the whole area are held at once, 4 bytes a post.
+/// Measures the load modules of a finished database against the ground it was built from, or against the rasters
+/// `against` where there are some. The heights of the whole area are held at once, 4 bytes a post.
 ///
 /// # Errors
 /// When the database is missing, unfinished or damaged, or the ground cannot be found or used.
-pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result<DatabaseFidelity, CompileError> {
+pub fn fidelity(folder: &Path, against: &[PathBuf], sights: Sights) -> Result<DatabaseFidelity, CompileError> {
     let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
     // No point that was given changes a figure, and weights do not; classes do.
     (job.tin.start, job.tin.pins) = (None, None);
@@ -163,6 +165,7 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         }
         .into());
     }
+    let covered = covered(&dem);
     let (modules, polygons) = modules_of(&folder, &manifest, &area)?;
     let at_own_posts = at_own_posts(&ground, &area, &modules)?;
     let triangles = Triangles::of_modules(modules.iter(), area.grid, area.frame.spacing);
@@ -178,6 +181,7 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
     Ok(DatabaseFidelity {
         area,
         against,
+        covered,
         is_burned,
         is_outdated,
         residual,
@@ -186,6 +190,11 @@ pub fn fidelity(folder: &Path, against: Option<&Path>, sights: Sights) -> Result
         past_objects,
         no_classes,
     })
+}
+
+/// The share of posts at which a DEM has a height.
+pub(crate) fn covered(dem: &Dem) -> f64 {
+    1.0 - dem.void_count() as f64 / dem.rect().post_count() as f64
 }
 
 /// Measures a mesh against the raster it was made from, whose posts are so far apart.

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use build::product::WantedGround;
 use clap::builder::{PossibleValue, PossibleValuesParser, StyledStr, TypedValueParser};
 use clap::{Args, ValueEnum};
 use exports::Coordinates;
@@ -60,6 +61,51 @@ impl Workers {
             Err(_) => (self.count(), None),
         }
     }
+}
+
+/// What a database is measured against.
+#[derive(Args, Clone, Debug)]
+pub struct Against {
+    /// A raster to take for the ground; several are joined as those of a job are [default: what the database was built
+    /// from]
+    #[arg(long = "against", value_name = "DEM")]
+    rasters: Vec<PathBuf>,
+}
+
+impl Against {
+    /// The rasters that were named; none where it is the ground that the database was built from.
+    pub fn rasters(&self) -> &[PathBuf] {
+        &self.rasters
+    }
+
+    /// Whether rasters were named.
+    pub fn is_named(&self) -> bool {
+        !self.rasters.is_empty()
+    }
+
+    /// The ground that is wanted.
+    pub fn ground(&self) -> WantedGround<'_> {
+        wanted_ground(&self.rasters)
+    }
+
+    /// Tells where rasters that were named have a height at a share of the posts only.
+    pub fn tell_covered(&self, share: f64) {
+        if self.is_named() && share < 1.0 {
+            let names: Vec<String> = self.rasters.iter().map(|path| path.display().to_string()).collect();
+            // A few posts without a height are never told as all of them.
+            let percent = (1000.0 * share).floor() / 10.0;
+            terminal::tell(&format!(
+                "note: {}: heights at {percent:.1} % of the posts; the rest is in no figure\n\
+                 hint: --against may be given several times: rasters are joined",
+                names.join(", ")
+            ));
+        }
+    }
+}
+
+/// The ground of rasters, or that a database was built from where there are none.
+pub fn wanted_ground(rasters: &[PathBuf]) -> WantedGround<'_> {
+    if rasters.is_empty() { WantedGround::Recorded } else { WantedGround::Rasters(rasters) }
 }
 
 /// How a run is followed on stderr.

@@ -3,10 +3,9 @@
 
 use std::error::Error;
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use build::product::WantedGround;
 use build::workbench::{HeldGround, Mesh, TinRequest};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, Command, FromArgMatches};
@@ -15,6 +14,7 @@ use job::Job;
 use store::Report;
 use terrain::{ModuleId, TileId};
 
+use crate::arguments::wanted_ground;
 pub use crate::clock::SystemClock;
 pub use crate::commands::tin::end_in_words;
 use crate::commands::{budgets, compare, correlate, explain, export, plan, tile, tin};
@@ -83,7 +83,8 @@ pub fn check_tile(job: &Job, id: TileId) -> Result<(), Failure> {
 /// # Errors
 /// When there is no such load module, or the database cannot be read.
 pub fn explain(folder: &Path, module: ModuleId, against: Option<&Path>) -> Result<String, Failure> {
-    let ground = against.map_or(WantedGround::Recorded, WantedGround::Raster);
+    let against: Vec<PathBuf> = against.map(Path::to_path_buf).into_iter().collect();
+    let ground = wanted_ground(&against);
     Ok(explain::to_json(&inspect::explain(folder, module, ground, cores())?).to_string())
 }
 

@@ -1,7 +1,7 @@
 //! A finished database, opened: what it says of itself, its job, and its area; and the ground that it was built from,
 //! for those who compare with it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use job::Job;
@@ -59,11 +59,11 @@ pub struct BuiltFrom {
 }
 
 impl BuiltFrom {
-    /// Opens the ground the database was built from, or the raster `against`.
+    /// Opens the ground the database was built from, or the rasters `against` where there are some.
     ///
     /// # Errors
     /// When the database is missing, unfinished or damaged, or the ground cannot be found or used.
-    pub fn open(folder: &Path, against: Option<&Path>) -> Result<Self, ProductError> {
+    pub fn open(folder: &Path, against: &[PathBuf]) -> Result<Self, ProductError> {
         let Opened { folder, manifest, mut job, area } = Opened::open(folder)?;
         // Nothing that is compared with heights depends on weights.
         job.importance.areas.clear();

@@ -1,7 +1,7 @@
 //! A finished database read back, to be looked at: load modules, the ground they were made from, and
 //! how far one lies from the other at every post.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use crate::ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
@@ -32,8 +32,8 @@ pub enum WantedGround<'a> {
     None,
     /// What the database was built from, looked for by its content.
     Recorded,
-    /// A raster.
-    Raster(&'a Path),
+    /// Rasters, joined as the job joins its own.
+    Rasters(&'a [PathBuf]),
     /// What this job names: the one that was just built.
     Job(&'a Job),
 }
@@ -70,6 +70,13 @@ pub struct ProductGround {
     pub residuals: Vec<i32>,
     /// What the heights come from, in words.
     pub name: String,
+}
+
+impl ProductGround {
+    /// Share of the posts at which there is a height.
+    pub fn covered(&self) -> f64 {
+        1.0 - self.dem.void_count() as f64 / self.residuals.len() as f64
+    }
 }
 
 /// Counts held against limits.
@@ -190,14 +197,14 @@ fn open_ground(opened: &Opened, wanted: WantedGround) -> Result<Option<(Job, Str
     let mut job = match wanted {
         WantedGround::None => return Ok(None),
         WantedGround::Job(job) => job.clone(),
-        WantedGround::Recorded | WantedGround::Raster(_) => job.clone(),
+        WantedGround::Recorded | WantedGround::Rasters(_) => job.clone(),
     };
     // No weight changes a height.
     job.importance.areas.clear();
     let name = match wanted {
         WantedGround::Job(job) => job.area.name.clone(),
-        WantedGround::Raster(path) => choose_ground(&mut job, manifest, folder.dir(), Some(path))?,
-        _ => choose_ground(&mut job, manifest, folder.dir(), None)?,
+        WantedGround::Rasters(paths) => choose_ground(&mut job, manifest, folder.dir(), paths)?,
+        _ => choose_ground(&mut job, manifest, folder.dir(), &[])?,
     };
     Ok(Some((job, name)))
 }

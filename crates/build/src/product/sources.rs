@@ -7,8 +7,9 @@ use store::{Fingerprint, Manifest, SourceRecord, files};
 
 use crate::product::ProductError;
 
-/// Points the job at the ground to measure against, and gives its name. A raster of one's own choice is taken as it
-/// is: no feature and no water is burned into it, and what is void in it is left out.
+/// Points the job at the ground to measure against, and gives its name: that of the database, or rasters of one's own
+/// choice. Several are joined as the job joins them. No feature and no water is burned into them, and what is void in
+/// all of them is left out.
 ///
 /// # Errors
 /// When no file with the recorded content is there.
@@ -16,18 +17,22 @@ pub fn choose_ground(
     job: &mut Job,
     manifest: &Manifest,
     folder: &Path,
-    against: Option<&Path>,
+    against: &[PathBuf],
 ) -> Result<String, ProductError> {
     let water = job.dem.water.as_mut().map(|water| &mut water.file);
     let shaping = job.dem.geoids.iter_mut().map(|geoid| &mut geoid.file).chain(water);
     locate(shaping, manifest, folder)?;
-    if let Some(path) = against {
-        let (written, said) = (path.display().to_string(), SourceSaid::default());
-        let files = vec![SourceFile { written: written.clone(), path: path.into(), said: said.clone() }];
-        job.dem.source = DemSource::Files { written: vec![SourceEntry { name: written.clone(), said }], files };
+    if !against.is_empty() {
+        let said = SourceSaid::default();
+        let names: Vec<String> = against.iter().map(|path| path.display().to_string()).collect();
+        let entry = |name: &String| SourceEntry { name: name.clone(), said: said.clone() };
+        let file =
+            |path: &PathBuf| SourceFile { written: path.display().to_string(), path: path.clone(), said: said.clone() };
+        let (written, files) = (names.iter().map(entry).collect(), against.iter().map(file).collect());
+        job.dem.source = DemSource::Files { written, files };
         job.dem.voids = Voids::Hole;
         (job.features, job.dem.water) = (None, None);
-        return Ok(written);
+        return Ok(names.join(", "));
     }
     match &mut job.dem.source {
         DemSource::Sample { seed } => Ok(format!("the sample terrain, seed {seed}")),

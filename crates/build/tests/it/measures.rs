@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::path::PathBuf;
 
 use build::CompileError;
 use fidelity::{DemGround, Triangles};
@@ -26,8 +27,12 @@ fn built(words: &Words) -> (Scene, Dem) {
 }
 
 fn measured(scene: &Scene, against: Option<&str>) -> Result<DatabaseFidelity, CompileError> {
-    let against = against.map(|name| scene.path(name));
-    inspect::fidelity(&scene.path("area"), against.as_deref(), SIGHTS)
+    measured_against(scene, against.as_slice())
+}
+
+fn measured_against(scene: &Scene, rasters: &[&str]) -> Result<DatabaseFidelity, CompileError> {
+    let rasters: Vec<PathBuf> = rasters.iter().map(|name| scene.path(name)).collect();
+    inspect::fidelity(&scene.path("area"), &rasters, SIGHTS)
 }
 
 /// All load modules welded into one TIN, by equal places.
@@ -140,6 +145,25 @@ fn the_ground_of_the_build_is_found_by_its_content() {
     let error = measured(&scene, None).unwrap_err();
     assert!(error.to_string().contains("has changed since the build"), "{error}");
     assert!(measured(&scene, Some("dem.tif")).unwrap().measures != found.measures);
+}
+
+#[test]
+fn several_rasters_are_joined_and_one_of_them_says_what_share_it_covers() {
+    let (scene, dem) = built(&words());
+    let whole = measured(&scene, None).unwrap();
+    assert_eq!(whole.covered, 1.0);
+    let rect = dem.rect();
+    let middle = i32::midpoint(rect.west, rect.east);
+    let parts = [("west.tif", rect.west, middle + 1), ("east.tif", middle, rect.east)];
+    for (name, west, east) in parts {
+        let inside = |post: Post| (west <= post.col && post.col <= east).then(|| dem.height(post));
+        write_dem(&scene.path(name), &Dem::from_fn(rect, inside));
+    }
+    let joined = measured_against(&scene, &["west.tif", "east.tif"]).unwrap();
+    assert_eq!((joined.against.ends_with("east.tif"), joined.covered), (true, 1.0));
+    assert_eq!(joined.measures.tin.residual, whole.measures.tin.residual);
+    let half = measured_against(&scene, &["west.tif"]).unwrap();
+    assert!((0.5..0.55).contains(&half.covered), "{}", half.covered);
 }
 
 #[test]

@@ -200,9 +200,9 @@ fn until_a_build_has_renewed_the_rest_none_says_that_nothing_changed() {
 fn check_outdated(scene: &Scene, expected: bool) {
     let area = scene.path("area");
     assert_eq!(inspect::status(&area).unwrap().is_outdated, expected);
-    assert_eq!(inspect::inadequate(&area, None).unwrap().is_outdated, expected);
+    assert_eq!(inspect::inadequate(&area, &[], None).unwrap().is_outdated, expected);
     let sights = inspect::Sights { pairs: 100, seed: 1 };
-    assert_eq!(inspect::fidelity(&area, None, sights).unwrap().is_outdated, expected);
+    assert_eq!(inspect::fidelity(&area, &[], sights).unwrap().is_outdated, expected);
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn one_more_point_is_not_tried_on_ground_that_a_load_module_was_not_made_from() 
     let found = explain(far, WantedGround::Recorded);
     assert!(found.one_more.is_none() && found.no_ground.unwrap().contains("`tiefort build`"));
     let [old, new] = ["old.tif", "dem.tif"]
-        .map(|name| explain(far, WantedGround::Raster(&scene.path(name))).one_more.unwrap().rms_before_m);
+        .map(|name| explain(far, WantedGround::Rasters(&[scene.path(name)])).one_more.unwrap().rms_before_m);
     assert!(old < 10.0 && 25.0 < new, "{old} {new}");
 }
 

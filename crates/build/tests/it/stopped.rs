@@ -39,7 +39,7 @@ fn build_and_stop(scene: &Scene, stage: Stage, tiles: usize, workers: usize) {
     assert!(!status.is_complete() && status.held == store::engine::Held::Free);
     let verdict = inspect::verify(&scene.path("area"), None).unwrap();
     assert!(verdict.problems.iter().any(|problem| problem.contains("incomplete")), "{:?}", verdict.problems);
-    let measured = inspect::fidelity(&scene.path("area"), None, Sights::USUAL);
+    let measured = inspect::fidelity(&scene.path("area"), &[], Sights::USUAL);
     assert!(matches!(measured, Err(CompileError::Database(DatabaseError::Unfinished { .. }))), "{measured:?}");
 }
 

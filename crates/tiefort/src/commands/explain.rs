@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use build::product::WantedGround;
 use clap::Args;
 use inspect::{ExplainedFeatures, ExplainedObjects, Explanation, explain};
 use serde_json::{Value, json};
@@ -10,7 +9,7 @@ use store::{FeatureFarOff, FeatureLeftOut, FeatureRemark, FeatureWhy, ObjectLeft
 use terrain::{ModuleId, RefusedBy, StopReason, TileId};
 use views::{Align, Table, fold, grouped};
 
-use crate::arguments::{Format, Workers, row_col};
+use crate::arguments::{Against, Format, Workers, row_col};
 use crate::failure::{Failure, Outcome};
 
 const AFTER_HELP: &str = "\
@@ -38,9 +37,8 @@ pub struct Arguments {
     /// For a person or a program
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// The raster to take for the ground [default: what the database was built from]
-    #[arg(long, value_name = "DEM")]
-    against: Option<PathBuf>,
+    #[command(flatten)]
+    against: Against,
     #[command(flatten)]
     workers: Workers,
 }
@@ -48,8 +46,7 @@ pub struct Arguments {
 /// Explains.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let module = ModuleId { row: arguments.module.row, col: arguments.module.col };
-    let ground = arguments.against.as_deref().map_or(WantedGround::Recorded, WantedGround::Raster);
-    let found = explain(&arguments.database, module, ground, arguments.workers.count())?;
+    let found = explain(&arguments.database, module, arguments.against.ground(), arguments.workers.count())?;
     arguments.format.print(|| text(&found), || to_json(&found))?;
     Ok(Outcome::Sound)
 }

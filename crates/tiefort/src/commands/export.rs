@@ -84,9 +84,9 @@ pub struct Arguments {
     /// What the raster holds; for geotiff only [default: surface]
     #[arg(long, value_enum)]
     layer: Option<Layer>,
-    /// The raster to take the residual against [default: the ground the database was built from]
+    /// A raster to take the residual against, or several [default: the ground the database was built from]
     #[arg(long, value_name = "DEM")]
-    against: Option<PathBuf>,
+    against: Vec<PathBuf>,
     /// What to take heights to be above, whatever the database says: EGM96, ellipsoid, or metres that their datum
     /// lies above the ellipsoid; for 3dtiles, 3dtiles-terrain, 3tz, quantized-mesh and mbtiles only
     #[arg(long, value_name = "DATUM", value_parser = datum, allow_hyphen_values = true)]
@@ -245,7 +245,7 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
         let message = "found --encoding with another format than terrain-rgb, expected none";
         return Err(Failure::new(message, "leave it out, or add --format terrain-rgb"));
     }
-    if arguments.against.is_some() && !residual {
+    if !arguments.against.is_empty() && !residual {
         let message = "found --against without --layer residual, expected both or none";
         return Err(Failure::new(message, "only a residual is taken against a raster"));
     }
@@ -439,7 +439,7 @@ fn write_raster(arguments: &Arguments, product: &Product, work: &Work) -> Result
     if arguments.layer != Some(Layer::Residual) {
         return files::write_whole_or(&arguments.out, |out| Ok(exports::write_surface(out, product, work)?));
     }
-    let ground = BuiltFrom::open(arguments.database(), arguments.against.as_deref())?;
+    let ground = BuiltFrom::open(arguments.database(), &arguments.against)?;
     let fault = |error: CompileError| ExportError::Ground { message: error.to_string(), hint: error.hint() };
     let heights = |rect: PostRect| ground.heights(rect).map_err(|error| fault(error.into()));
     files::write_whole_or(&arguments.out, |out| Ok(exports::write_residual(out, product, &heights, work)?))

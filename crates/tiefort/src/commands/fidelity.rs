@@ -7,7 +7,7 @@ use inspect::{DatabaseFidelity, PastObjectsFound, Sights};
 use serde_json::{Value, json};
 use views::{fold, grouped};
 
-use crate::arguments::Format;
+use crate::arguments::{Against, Format};
 use crate::failure::{Failure, OUTDATED, Outcome};
 use crate::{measures, measures_json};
 
@@ -42,9 +42,8 @@ pub struct Arguments {
     /// What the pairs are drawn from: the same seed, the same pairs
     #[arg(long, value_name = "S", default_value_t = Sights::USUAL.seed)]
     seed: u64,
-    /// A raster of heights to measure against [default: the ground the database was built from]
-    #[arg(long, value_name = "DEM")]
-    against: Option<PathBuf>,
+    #[command(flatten)]
+    against: Against,
     /// For a person or a program
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
@@ -56,7 +55,8 @@ const PAIRS_MAX: i64 = 100_000_000;
 /// Measures.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let sights = Sights { pairs: arguments.pairs, seed: arguments.seed };
-    let found = inspect::fidelity(&arguments.database, arguments.against.as_deref(), sights)?;
+    let found = inspect::fidelity(&arguments.database, arguments.against.rasters(), sights)?;
+    arguments.against.tell_covered(found.covered);
     arguments.format.print(|| text(&found), || to_json(&found, sights))?;
     Ok(Outcome::Sound)
 }
@@ -94,6 +94,7 @@ fn to_json(found: &DatabaseFidelity, sights: Sights) -> Value {
     let mut all = json!({
         "area": found.area,
         "against": found.against,
+        "covered": found.covered,
         "has_features_burned_in": found.is_burned,
         "outdated": found.is_outdated,
         "residual_at_own_posts": found.at_own_posts.as_ref().map(measures_json::residual),

@@ -8,7 +8,7 @@ use inspect::{Component, Inadequate};
 use serde_json::{Value, json};
 use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_limits, fold, grouped};
 
-use crate::arguments::{Format, one_of, positive};
+use crate::arguments::{Against, Format, one_of, positive};
 use crate::failure::{Failure, OUTDATED, Outcome};
 use crate::{files, terminal};
 
@@ -16,6 +16,7 @@ const AFTER_HELP: &str = "\
 Examples:
   tiefort inadequate ntc.tdb
   tiefort inadequate ntc.tdb --tolerance 5 --out maps
+  tiefort inadequate desert.tdb --against desert.tif    against your own raster
 
 Writes inadequate.geojson (each piece of ground with its worst post, area, load
 modules, what stands in the way and what could be done), error.png (weighted
@@ -43,6 +44,8 @@ pub struct Arguments {
     /// Weighted residual in metres that is still good enough [default: 3 times the RMS residual as built]
     #[arg(long, value_name = "M", value_parser = positive)]
     tolerance: Option<f64>,
+    #[command(flatten)]
+    against: Against,
     /// Folder for the three files, made where it is not there yet [default: that of the database]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -61,7 +64,8 @@ const FORMATS: [(&str, Format, &str); 2] = [
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let folder = arguments.out.as_ref().unwrap_or(&arguments.database);
     let files = ["inadequate.geojson", "error.png", "density.png"].map(|name| folder.join(name));
-    let found = inspect::inadequate(&arguments.database, arguments.tolerance)?;
+    let found = inspect::inadequate(&arguments.database, arguments.against.rasters(), arguments.tolerance)?;
+    arguments.against.tell_covered(found.covered);
     files::make_folder(folder)?;
     files::check_writable(&files[0])?;
     let collection = format!("{:#}\n", geojson(&found));
@@ -70,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         files::write_whole(path, |out| image.write_png(out))?;
     }
     terminal::print(&match arguments.format {
-        Format::Text => text(&found, &files),
+        Format::Text => text(&found, &files, arguments.against.is_named()),
         Format::Json => collection,
     })?;
     Ok(Outcome::Sound)
@@ -100,13 +104,18 @@ fn maps(found: &Inadequate) -> [Image; 2] {
     [draw_errors(&scene, &found.residual_m, found.tolerance_m, MAP_PIXELS), draw_module_limits(&scene, MAP_PIXELS)]
 }
 
-fn text(found: &Inadequate, files: &[PathBuf; 3]) -> String {
+fn text(found: &Inadequate, files: &[PathBuf; 3], is_named: bool) -> String {
     let all = &found.components;
     let posts: u64 = all.iter().map(|component| component.posts).sum();
-    let ground = if found.is_outdated { "as it is now" } else { "that tiles were refined to" };
+    let ground = match (is_named, found.is_outdated) {
+        (true, _) => found.against.clone(),
+        (false, is_outdated) => format!(
+            "the ground {}, any roads and water in it; --against FILE measures against FILE itself",
+            if is_outdated { "as it is now" } else { "that tiles were refined to" }
+        ),
+    };
     let mut text = format!(
-        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\nagainst the ground {ground}, \
-         any roads and water in it; `tiefort fidelity --against FILE` measures against a raster\n",
+        "Gaming area {}: {} pieces of ground, {} posts, above {:.2} m\nagainst {ground}\n",
         found.area,
         grouped(all.len() as u64),
         grouped(posts),
@@ -161,6 +170,8 @@ fn geojson(found: &Inadequate) -> Value {
         "type": "FeatureCollection",
         "name": "inadequate",
         "crs": { "type": "name", "properties": { "name": name } },
+        "against": found.against,
+        "covered": found.covered,
         "tolerance_m": found.tolerance_m,
         "outdated": found.is_outdated,
         "features": features,

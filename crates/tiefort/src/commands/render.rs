@@ -8,7 +8,7 @@ use store::Folder;
 use terrain::{LoadModule, ModuleId, ModuleRect};
 use views::{Eye, Image, Map, RESIDUAL_SCALE_M, Shown, Sight, Style, draw_map, draw_sight};
 
-use crate::arguments::{Workers, one_of, positive};
+use crate::arguments::{Against, Workers, one_of, positive};
 use crate::failure::{Failure, Outcome};
 use crate::files;
 
@@ -67,9 +67,8 @@ pub struct Arguments {
     /// Draw heights so many times as large; for perspectives only [default: 1]
     #[arg(long, value_name = "TIMES", value_parser = positive)]
     exaggeration: Option<f64>,
-    /// The raster to take for the ground [default: what the database was built from]
-    #[arg(long, value_name = "DEM")]
-    against: Option<PathBuf>,
+    #[command(flatten)]
+    against: Against,
     #[command(flatten)]
     workers: Workers,
 }
@@ -116,14 +115,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let reads_all = matches!(arguments.view, View::Density | View::Limits | View::Tiles);
     let wanted = Wanted {
         part: if reads_all { None } else { arguments.modules },
-        ground: match &arguments.against {
-            _ if !needs_ground(arguments) => WantedGround::None,
-            Some(path) => WantedGround::Raster(path),
-            None => WantedGround::Recorded,
-        },
+        ground: if needs_ground(arguments) { arguments.against.ground() } else { WantedGround::None },
         workers: arguments.workers.count(),
     };
     let product = Product::read(&arguments.database, &wanted)?;
+    if let Some(ground) = &product.ground {
+        arguments.against.tell_covered(ground.covered());
+    }
     let image = draw(arguments, &product, reads_all)?;
     files::write_whole(&arguments.out, |out| image.write_png(out))?;
     Ok(Outcome::Sound)
@@ -211,7 +209,7 @@ fn refuse_flags_without_use(arguments: &Arguments) -> Result<(), Failure> {
         ("--pitch", arguments.pitch.is_some() && !perspective, "perspective or wireframe"),
         ("--field-of-view", arguments.field_of_view.is_some() && !perspective, "perspective or wireframe"),
         ("--exaggeration", arguments.exaggeration.is_some() && !perspective, "perspective or wireframe"),
-        ("--against", arguments.against.is_some() && !needs_ground(arguments), "residual, or one that shows the DEM"),
+        ("--against", arguments.against.is_named() && !needs_ground(arguments), "residual, or one that shows the DEM"),
     ];
     match flags.into_iter().find(|&(_, useless, _)| useless) {
         Some((flag, _, use_of)) => {

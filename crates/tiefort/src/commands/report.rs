@@ -6,7 +6,7 @@ use build::product::{Product, Wanted, WantedGround};
 use clap::{Args, ValueEnum};
 use store::{Folder, Report};
 
-use crate::arguments::Workers;
+use crate::arguments::{Workers, wanted_ground};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -28,9 +28,9 @@ pub struct Arguments {
     /// For a person, a program or a browser
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
-    /// The raster to take for the ground; for html only [default: what the database was built from]
+    /// A raster to take for the ground, or several; for html only [default: what the database was built from]
     #[arg(long, value_name = "DEM")]
-    against: Option<PathBuf>,
+    against: Vec<PathBuf>,
     #[command(flatten)]
     workers: Workers,
 }
@@ -47,7 +47,7 @@ enum Format {
 
 /// Prints the report.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
-    if arguments.against.is_some() && arguments.format != Format::Html {
+    if !arguments.against.is_empty() && arguments.format != Format::Html {
         let message = "found --against with a report that draws nothing, expected --format html";
         return Err(Failure::new(message, "leave --against out, or add --format html"));
     }
@@ -60,7 +60,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
             serde_json::to_string_pretty(&report).expect("a report that was read from JSON is JSON again") + "\n"
         }
         Format::Text => views::report_text(&report),
-        Format::Html => page(&arguments.database, &report, arguments.against.as_deref(), arguments.workers.count())?,
+        Format::Html => page(&arguments.database, &report, &arguments.against, arguments.workers.count())?,
     };
     terminal::print(&text)?;
     Ok(if report.breaches.is_empty() { Outcome::Sound } else { Outcome::Breaches })
@@ -69,12 +69,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 /// The page of a report; without the ground's part of it where the ground is not to be found and none was named.
 ///
 /// # Errors
-/// When the database or the raster `against` cannot be read.
-pub fn page(database: &Path, report: &Report, against: Option<&Path>, workers: usize) -> Result<String, Failure> {
-    let ground = against.map_or(WantedGround::Recorded, WantedGround::Raster);
-    let wanted = Wanted { part: None, ground, workers };
+/// When the database or a raster of `against` cannot be read.
+pub fn page(database: &Path, report: &Report, against: &[PathBuf], workers: usize) -> Result<String, Failure> {
+    let wanted = Wanted { part: None, ground: wanted_ground(against), workers };
     let product = match Product::read(database, &wanted) {
-        Err(error) if error.is_of_the_ground() && against.is_none() => {
+        Err(error) if error.is_of_the_ground() && against.is_empty() => {
             terminal::tell(&format!("note: {error}; the page is drawn without it\nhint: --against DEM names it\n"));
             Product::read(database, &Wanted { ground: WantedGround::None, ..wanted })?
         }

@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
 #[cfg(all(feature = "serve", not(feature = "viewer")))]
 fn drawn(folder: &Path) -> Result<String, Failure> {
     let written = std::fs::read_to_string(folder.join("report.html"));
-    written.or_else(|_| super::report::page(folder, &Folder::new(folder).report()?, None, resources::cores()))
+    written.or_else(|_| super::report::page(folder, &Folder::new(folder).report()?, &[], resources::cores()))
 }
 
 /// Says how to get a program that can.
