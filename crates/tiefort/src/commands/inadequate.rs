@@ -10,7 +10,7 @@ use views::{Align, Image, Scene, SceneLimits, Table, draw_errors, draw_module_li
 
 use crate::arguments::{Against, Format, one_of, positive};
 use crate::failure::{Failure, OUTDATED, Outcome};
-use crate::{files, terminal};
+use crate::{files, left_over, terminal};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -64,10 +64,10 @@ const FORMATS: [(&str, Format, &str); 2] = [
 pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     let folder = arguments.out.as_ref().unwrap_or(&arguments.database);
     let files = ["inadequate.geojson", "error.png", "density.png"].map(|name| folder.join(name));
+    check_folder(arguments, &files)?;
     let found = inspect::inadequate(&arguments.database, arguments.against.rasters(), arguments.tolerance)?;
     arguments.against.tell_covered(found.covered);
     files::make_folder(folder)?;
-    files::check_writable(&files[0])?;
     let collection = format!("{:#}\n", geojson(&found));
     files::write_whole(&files[0], |out| std::io::Write::write_all(out, collection.as_bytes()))?;
     for (image, path) in maps(&found).iter().zip(&files[1..]) {
@@ -78,6 +78,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
         Format::Json => collection,
     })?;
     Ok(Outcome::Sound)
+}
+
+/// Refuses a folder that takes no files, before the work.
+fn check_folder(arguments: &Arguments, files: &[PathBuf; 3]) -> Result<(), Failure> {
+    match &arguments.out {
+        // A folder that is not there is made when there is something to put into it.
+        Some(folder) if !left_over::is_taken(folder) => Ok(()),
+        Some(folder) => files::make_folder(folder).and_then(|()| files::check_writable(&files[0])),
+        // What is no database is told as that.
+        None if !arguments.database.is_dir() => Ok(()),
+        None => files::check_writable(&files[0])
+            .map_err(|failure| Failure::new(failure.message(), "name another folder for the three files: --out DIR")),
+    }
 }
 
 /// The two maps: of errors, and of what each load module uses of its limit.
