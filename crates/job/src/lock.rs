@@ -73,6 +73,23 @@ impl Lock {
         self.files.iter().find(|locked| locked.address == without_query(address))
     }
 
+    /// Where locks in a folder say that what an address names was put, for whichever jobs; what is no lock is passed
+    /// over.
+    pub fn fetched_beside(folder: &Path, address: &str) -> Vec<PathBuf> {
+        let listed = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let entries = fs::read_dir(listed).into_iter().flatten().flatten();
+        let mut names: Vec<PathBuf> = entries.map(|entry| PathBuf::from(entry.file_name())).collect();
+        names.retain(|name| name.extension().is_some_and(|extension| extension == "lock"));
+        names.sort();
+        let places = names.into_iter().filter_map(|name| {
+            // A lock has the name of its job but for the ending.
+            let job = folder.join(name);
+            let lock = Self::read(&job).ok()??;
+            lock.of(address).map(|locked| locked.path(&job))
+        });
+        places.collect()
+    }
+
     /// Reads the lock of the job at `job`; `None` where there is none.
     ///
     /// # Errors
@@ -189,6 +206,19 @@ mod tests {
         fs::write(folder.path().join("a.lock"), lock().text()).unwrap();
         assert_eq!(Lock::read(&job).unwrap(), Some(lock()));
         assert_eq!(lock().of("https://a.org/x.tif?sig=1").unwrap().file, "x.tif");
+    }
+
+    #[test]
+    fn what_was_fetched_is_found_by_its_address_for_any_job_of_a_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.lock", "b.lock"] {
+            fs::write(folder.path().join(name), lock().text()).unwrap();
+        }
+        fs::write(folder.path().join("Cargo.lock"), "version = 4\n").unwrap();
+        let found = |address: &str| Lock::fetched_beside(folder.path(), address);
+        let expected = ["a.sources/x.tif", "b.sources/x.tif"].map(|name| folder.path().join(name));
+        assert_eq!(found("https://a.org/x.tif?sig=1"), expected);
+        assert_eq!(found("https://a.org/z.tif"), [PathBuf::new(); 0]);
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use job::{AreaShape, DemSource, FeatureSource, Job, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids};
+use job::{
+    AreaShape, DemSource, FeatureSource, Job, Lock, NamedFile, SourceEntry, SourceFile, SourceSaid, Voids, is_remote,
+};
 use store::{Fingerprint, Manifest, SourceRecord, files};
 
 use crate::product::ProductError;
@@ -85,7 +87,7 @@ pub fn locate_features(job: &mut Job, manifest: &Manifest, folder: &Path) -> Res
     locate(files, manifest, folder)
 }
 
-/// A raster a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but
+/// A file a database was built from. Its path is written as the job has it, and the job may have lain anywhere; but
 /// its content is known, so any file with that content is the one.
 fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, ProductError> {
     let missing = |found: String| {
@@ -97,9 +99,7 @@ fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, 
         )
     };
     let Some(record) = record else { return Err(missing("no source".into())) };
-    let beside = std::path::absolute(folder).ok().and_then(|folder| folder.parent().map(Path::to_path_buf));
-    let here = PathBuf::from(&record.path);
-    let places: Vec<PathBuf> = beside.iter().map(|folder| folder.join(&record.path)).chain([here]).collect();
+    let places = places_of(&record.path, folder);
     let mut other = None;
     for place in &places {
         match source_files::content(place).map(Fingerprint::of_reader) {
@@ -108,8 +108,19 @@ fn find_source(record: Option<&SourceRecord>, folder: &Path) -> Result<PathBuf, 
             Err(_) => {}
         }
     }
+    let fetched = if is_remote(&record.path) { ", nor fetched for a job there" } else { "" };
     Err(missing(match other {
         Some(place) => format!("{}, whose content has changed since the build", place.display()),
-        None => format!("the source {:?}, which is neither beside the database nor here", record.path),
+        None => format!("the source {:?}, which is neither beside the database nor here{fetched}", record.path),
     }))
+}
+
+/// Where a source may lie: beside the database, or here. An address is looked up in the locks of jobs there.
+fn places_of(written: &str, folder: &Path) -> Vec<PathBuf> {
+    let beside = std::path::absolute(folder).ok().and_then(|folder| folder.parent().map(Path::to_path_buf));
+    let folders = beside.into_iter().chain([PathBuf::new()]);
+    match is_remote(written) {
+        true => folders.flat_map(|folder| Lock::fetched_beside(&folder, written)).collect(),
+        false => folders.map(|folder| folder.join(written)).collect(),
+    }
 }

@@ -68,6 +68,26 @@ fn fetched_windows_build_the_same_bytes_as_the_whole_file() {
 }
 
 #[test]
+fn a_database_of_fetched_sources_is_measured_where_its_lock_lies() {
+    let (_server, scene) = scene();
+    scene.run_to(0, &["fetch", "a.toml", "--quiet"]);
+    scene.run_to(0, &["build", "a.toml", "--quiet"]);
+    let fidelity = ["fidelity", "a.tdb", "--pairs", "100"];
+    assert!(scene.run_to(0, &fidelity).stdout.contains("a.sources/dem.tif"));
+    let said = scene.run_to(0, &["inadequate", "a.tdb", "--against", "a.sources/dem.tif"]).stdout;
+    assert_eq!(said.lines().nth(1), Some("against a.sources/dem.tif"), "{said}");
+    scene.run_to(0, &["inadequate", "a.tdb"]);
+    scene.run_to(0, &["render", "a.tdb", "--view", "residual", "--out", "a.png"]);
+    let said = scene.run_to(0, &["explain", "a.tdb", "1,1"]).stdout;
+    assert!(!said.contains("was not computed"), "{said}");
+    let mut elsewhere = scene.program();
+    elsewhere.current_dir(std::env::temp_dir()).arg("fidelity").arg(scene.path("a.tdb"));
+    assert_eq!(elsewhere.output().unwrap().status.code(), Some(0));
+    fs::remove_file(scene.path("a.lock")).unwrap();
+    scene.refuses(&fidelity, &["nor fetched for a job there"]);
+}
+
+#[test]
 fn an_overview_comes_where_its_posts_are_close_enough() {
     let (server, scene) = scene();
     fs::write(scene.path("b.toml"), job(&format!("\"{}/dem.tif\"", server.host), 62.5)).unwrap();
