@@ -36,7 +36,7 @@ pub fn workers_for(job: &Job, asked: Option<usize>) -> usize {
 /// # Errors
 /// When the job cannot be planned, or more memory or disk is forecast to be needed than is free.
 pub fn check_fits(job: &Job, workers: usize, folder: &Path) -> Result<(), Failure> {
-    fit::check(&build::plan(job)?.forecast, workers, folder)
+    fit::check(job, &build::plan(job)?.forecast, workers, folder)
 }
 
 /// What `tiefort tin` is asked for in these words, without those that say what to read and to write.

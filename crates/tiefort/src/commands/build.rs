@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     job.dem.strict = arguments.run.strict;
     if !arguments.force {
         let (workers, _) = arguments.run.workers.for_job(&job);
-        fit::check(&build::plan(&job)?.forecast, workers, &arguments.run.folder(&job))?;
+        fit::check(&job, &build::plan(&job)?.forecast, workers, &arguments.run.folder(&job))?;
     }
     let run = Run::announce(&job, &arguments.run, "building")?;
     run.finish(|listener| {

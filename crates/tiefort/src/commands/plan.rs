@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     };
     terminal::print(&text)?;
     if !arguments.force {
-        fit::check(&plan.forecast, PLANNED_WORKERS, folder)?;
+        fit::check(&job, &plan.forecast, PLANNED_WORKERS, folder)?;
     }
     Ok(Outcome::Sound)
 }

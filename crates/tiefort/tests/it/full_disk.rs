@@ -1,4 +1,5 @@
-//! A disk that is too small: the error says so, nothing half-written stays, and with room the same command goes on.
+//! A disk that is too small, or read-only: the error says so, nothing half-written stays, and with room the same
+//! command goes on.
 
 use std::process::Command;
 
@@ -24,6 +25,27 @@ done
 echo \"plan --force: $?\"
 ls";
 
+/// Builds, and asks for the same on a disk that has become full, and for a second database there.
+const AGAIN: &str = "
+mkdir disk && mount -t tmpfs -o size=16m tmpfs disk || exit 99
+cp job.toml disk && cd disk && \"$0\" build job.toml --out x.tdb --quiet >&2 || exit 98
+cat /dev/zero > rest 2>/dev/null
+for words in 'build job.toml --out x.tdb' 'plan job.toml --out x.tdb' 'build job.toml --out y.tdb'; do
+  \"$0\" $words >/dev/null
+  echo \"$words: $?\"
+done
+exit 0";
+
+/// Asks on a disk that is read-only for files in the folder of a database, and in another one.
+const READ_ONLY: &str = "
+\"$0\" build job.toml --out x.tdb --quiet >&2 || exit 98
+mkdir disk && mount --bind . disk && mount -o remount,bind,ro disk || exit 99
+\"$0\" inadequate disk/x.tdb
+echo $?
+\"$0\" inadequate disk/x.tdb --out maps >/dev/null
+echo $?
+exit 0";
+
 /// Builds where no file may grow beyond 1 kB (two blocks of 512 bytes).
 const SHORT_FILES: &str = "trap '' XFSZ; ulimit -f 2; exec \"$0\" build job.toml --out x.tdb";
 
@@ -44,18 +66,38 @@ fn a_disk_that_is_too_small_is_named_and_nothing_half_written_stays() {
     assert!(!said.stderr.contains("disk/x.tdb/."), "a temporary file was left: {}", said.stderr);
 }
 
+/// What a script says on a file system of its own; nothing where none can be mounted.
+fn mounted(scene: &Scene, script: &str) -> Option<Said> {
+    let mut shell = Command::new("unshare");
+    shell.args(["--map-root-user", "--mount", "sh", "-c", script, env!("CARGO_BIN_EXE_tiefort")]);
+    match shell.current_dir(scene.path("")).output() {
+        Ok(output) if output.status.code() == Some(0) => Some(Said::from(output)),
+        other => {
+            eprintln!("skipped: no file system can be mounted here: {other:?}");
+            None
+        }
+    }
+}
+
+#[test]
+fn a_database_that_is_there_takes_no_more_disk_to_build_again() {
+    let Some(said) = mounted(&Scene::with_job("small.toml", &[]), AGAIN) else { return };
+    let lines: Vec<&str> = said.stdout.lines().collect();
+    let expected = ["build job.toml --out x.tdb: 0", "plan job.toml --out x.tdb: 0", "build job.toml --out y.tdb: 2"];
+    assert_eq!(lines, expected, "{}", said.stderr);
+}
+
+#[test]
+fn what_is_looked_for_in_a_read_only_database_goes_into_another_folder() {
+    let Some(said) = mounted(&Scene::with_job("small.toml", &[]), READ_ONLY) else { return };
+    assert_eq!(said.stdout, "2\n0\n", "{}", said.stderr);
+    assert!(said.stderr.contains("--out DIR"), "{}", said.stderr);
+}
+
 #[test]
 fn a_build_that_is_forecast_not_to_fit_is_refused_before_anything_is_written_unless_forced() {
     let scene = Scene::with_job("small.toml", &[("spacing_m = 25", "spacing_m = 12.5")]);
-    let mut shell = Command::new("unshare");
-    shell.args(["--map-root-user", "--mount", "sh", "-c", BEFORE_A_BUILD, env!("CARGO_BIN_EXE_tiefort")]);
-    let said = match shell.current_dir(scene.path("")).output() {
-        Ok(output) if output.status.code() == Some(0) => Said::from(output),
-        other => {
-            eprintln!("skipped: no small file system can be mounted here: {other:?}");
-            return;
-        }
-    };
+    let Some(said) = mounted(&scene, BEFORE_A_BUILD) else { return };
     let lines: Vec<&str> = said.stdout.lines().collect();
     let expected = [
         "plan job.toml: 2",
