@@ -300,7 +300,8 @@ impl SourceError {
             Empty { .. } => "the file was not copied or unpacked whole; fetch it again",
             Changed { .. } => "leave sources alone during a build; run the same command again",
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
-                "the file is damaged or was not copied whole; fetch it again"
+                "the file is damaged or was not copied whole; fetch it again; what `tiefort fetch` brought \
+                 comes anew with --update"
             }
             Checksum { .. } => {
                 "the file is damaged, or its writer computed no checksums; without strict reading it is used"

@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Say what would come, and how many bytes; bring nothing
     #[arg(long)]
     dry_run: bool,
-    /// Take what has changed on its server since it was fetched
+    /// Take what has changed on its server since it was fetched, and anew what came damaged
     #[arg(long)]
     update: bool,
     /// Gigabytes that may come at most

@@ -10,6 +10,7 @@ use ureq::http::{HeaderMap, Response};
 use ureq::{Agent, Timeout};
 
 use super::address::Address;
+use super::check::page;
 use super::fault::{Fault, changed};
 use super::s3::{Credentials, Listed, fits, listed};
 use super::silence::{Heard, Silence};
@@ -292,7 +293,11 @@ impl<'a> Client<'a> {
         }
     }
 
-    fn stopped(&self) -> Result<(), Fault> {
+    /// Whether the work may go on.
+    ///
+    /// # Errors
+    /// When a person stopped it.
+    pub fn stopped(&self) -> Result<(), Fault> {
         match self.stop.load(Ordering::Relaxed) {
             true => Err(Fault::hinted("stopped".into(), "run the same command again: what has come is kept")),
             false => Ok(()),
@@ -307,6 +312,7 @@ impl<'a> Client<'a> {
             let response = self.one(&at, range, is_signed).map_err(|error| self.transport(address, &error))?;
             self.silence.heard();
             match response.status().as_u16() {
+                200 | 206 if is_page(response.headers()) => return Err(page(&address.to_string())),
                 200 | 206 => return Ok(response),
                 301 | 302 | 303 | 307 | 308 => at = at.redirected(&text(response.headers(), "location"))?,
                 401 | 403 if !is_signed && self.closes(&at) => {}
@@ -398,6 +404,11 @@ impl<'a> Client<'a> {
             }
         }
     }
+}
+
+/// Whether a server says that it sends a web page: to log in, or of an error that it does not own to.
+fn is_page(headers: &HeaderMap) -> bool {
+    text(headers, "content-type").to_ascii_lowercase().starts_with("text/html")
 }
 
 fn text(headers: &HeaderMap, name: &str) -> String {

@@ -7,11 +7,13 @@
 //!   silence    what a person is told while no server sends anything
 //!   plan       which ranges of which files an area needs; their bytes as a `Read + Seek` for their directories
 //!   pieces     ranges on the disk: what came before a cut is kept
+//!   check      whether a build can read what came
 //!   run        all files of a job, each brought under its final name, and its lock
 //! ```
 //! No signature and no password is in any message.
 
 mod address;
+mod check;
 mod client;
 mod fault;
 mod pieces;

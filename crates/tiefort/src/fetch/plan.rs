@@ -14,6 +14,7 @@ use source_files::{Crs, GeoParquet, TiffLevels};
 use store::engine::Fingerprint;
 
 use super::address::{Address, in_bucket};
+use super::check::{Refused, check_raster, is_page};
 use super::client::{Client, REQUESTS};
 use super::fault::{Fault, changed};
 use super::pieces::{Piece, Pieces, folder_of, joined, whole};
@@ -98,11 +99,12 @@ pub enum Kept {
     Not,
 }
 
-/// Whether a file that a lock has is here as it was fetched and as the server has it.
+/// Whether a file that a lock has is here as it was fetched and as the server has it; with `update` also whether a
+/// build could read it.
 ///
 /// # Errors
 /// When the server has another version, or none.
-pub fn kept(client: &Client, job: &Job, file: &NamedFile, lock: &Lock) -> Result<Kept, Fault> {
+pub fn kept(client: &Client, job: &Job, file: &NamedFile, (lock, update): (&Lock, bool)) -> Result<Kept, Fault> {
     let Some(locked) = lock.of(&file.written) else { return Ok(Kept::Not) };
     let (total, etag) = match pattern_of(&file.written) {
         Some((bucket, pattern)) => {
@@ -122,7 +124,26 @@ pub fn kept(client: &Client, job: &Job, file: &NamedFile, lock: &Lock) -> Result
         return Err(changed(&file.written, &version(&locked.etag, locked.remote_len), &found));
     }
     let is_of_area = locked.window.is_none() || lock.area == job.fetch_area();
-    Ok(if is_of_area && is_whole(locked, &job.path) { Kept::Here } else { Kept::Not })
+    let is_here = is_of_area && is_whole(locked, &job.path);
+    Ok(if is_here && (!update || is_read(client, job, locked)?) { Kept::Here } else { Kept::Not })
+}
+
+/// Whether a build could read a file that is here as it came.
+fn is_read(client: &Client, job: &Job, locked: &Locked) -> Result<bool, Fault> {
+    let path = locked.path(&job.path);
+    match raster_of(job, &locked.address) {
+        None => Ok(!is_page(&path).map_err(|error| disk(&path, &error))?),
+        Some(raster) => match check_raster(client, raster, &path) {
+            Ok(()) => Ok(true),
+            Err(Refused::Header(_) | Refused::Heights(_)) => Ok(false),
+            Err(Refused::Stopped(fault)) => Err(fault),
+        },
+    }
+}
+
+/// The raster of a job that an address stands for.
+pub(super) fn raster_of<'j>(job: &'j Job, written: &str) -> Option<&'j SourceFile> {
+    job.remote_rasters().into_iter().find(|raster| raster.written == written)
 }
 
 /// The bucket and the pattern of an address that stands for several files.
@@ -147,7 +168,7 @@ fn is_whole(locked: &Locked, job: &Path) -> bool {
 /// # Errors
 /// When the server does not give it, or a raster cannot be used.
 pub fn plan(client: &Client, job: &Job, file: &NamedFile, path: PathBuf) -> Result<Planned, Fault> {
-    let raster = job.remote_rasters().into_iter().find(|raster| raster.written == file.written);
+    let raster = raster_of(job, &file.written);
     let is_tiff = [".tif", ".tiff"].iter().any(|ending| file.written.to_lowercase().ends_with(ending));
     let is_parquet = [".parquet", ".geoparquet"].iter().any(|ending| file.written.to_lowercase().ends_with(ending));
     let vector = vector_of(job, &file.written);

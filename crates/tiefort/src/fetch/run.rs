@@ -15,10 +15,11 @@ use schedule::Workers;
 use source_files::GeoParquet;
 use store::engine::Fingerprint;
 
+use super::check::{Refused, check_raster, is_page, page};
 use super::client::{Client, Patience, REQUESTS};
 use super::fault::Fault;
 use super::pieces::Piece;
-use super::plan::{Kept, Planned, What, disk, kept, plan, stopped_or};
+use super::plan::{Kept, Planned, What, disk, kept, plan, raster_of, stopped_or};
 use super::silence;
 use crate::catalogue::{Catalogue, catalogue};
 use crate::clock::today;
@@ -133,7 +134,7 @@ fn tasks(
     update: bool,
 ) -> Result<Vec<Task>, Fault> {
     let task = |_, (file, path): &(NamedFile, PathBuf)| {
-        let kept = match kept(client, job, file, lock) {
+        let kept = match kept(client, job, file, (lock, update)) {
             Err(fault) if update && fault.is_change() => Kept::Not,
             end => end?,
         };
@@ -210,9 +211,8 @@ fn bring_all(
     };
     let one = |_, planned: &Mutex<Option<Planned>>| {
         let Some(planned) = guarded(planned).take() else { return Ok(()) };
-        let locked = bring(client, planned, &told)?;
-        let said = job.remote_rasters().into_iter().find(|raster| raster.written == locked.address);
-        let said = said.and_then(|raster| raster.said.attribution.clone());
+        let locked = bring(client, job, planned, &told)?;
+        let said = raster_of(job, &locked.address).and_then(|raster| raster.said.attribution.clone());
         let (licence, attribution) = known.said_of(&locked.address).unwrap_or_default();
         let (licence, attribution) = (licence.to_owned(), said.unwrap_or_else(|| attribution.to_owned()));
         let mut lock = guarded(&lock);
@@ -242,9 +242,12 @@ fn write(lock: &Lock, job: &Path) -> Result<(), Fault> {
 /// Brings a file; `told` hears of every range, with its bytes.
 ///
 /// # Errors
-/// When a range does not come, or cannot be written; those that came are kept.
-fn bring(client: &Client, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> Result<Locked, Fault> {
-    let half = planned.store.beside("whole");
+/// When a range does not come, or cannot be written; those that came are kept. When a build could not read the file:
+/// then nothing of it is.
+fn bring(client: &Client, job: &Job, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> Result<Locked, Fault> {
+    // Under its own name, which may say what it is.
+    let half = planned.store.beside("made").join(planned.path.file_name().expect("the file has a name"));
+    half.parent().map_or(Ok(()), fs::create_dir_all).map_err(|error| disk(&half, &error))?;
     let failed = |error: io::Error| disk(&half, &error);
     match &planned.what {
         What::Whole { has_ranges: false } => in_one_answer(client, &planned, &half, told)?,
@@ -267,6 +270,13 @@ fn bring(client: &Client, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> Resu
             write_to_disk(&half, |out| levels.write(*level, chunks, out, bytes)).map_err(failed)?;
         }
     }
+    if let Err(fault) = check(client, job, &planned, &half) {
+        if !client.stop().load(Ordering::Relaxed) {
+            let Planned { path, store, .. } = planned;
+            store.remove().map_err(|error| disk(&path, &error))?;
+        }
+        return Err(fault);
+    }
     let hash = File::open(&half).and_then(Fingerprint::of_reader).map_err(failed)?;
     let len = fs::metadata(&half).map_err(failed)?.len();
     fs::rename(&half, &planned.path).map_err(|error| disk(&planned.path, &error))?;
@@ -281,6 +291,27 @@ fn bring(client: &Client, planned: Planned, told: &(dyn Fn(u64) + Sync)) -> Resu
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let blake3 = hash.to_string();
     Ok(Locked { address: written, file, len, blake3, etag, remote_len: total, date, window, licence, attribution })
+}
+
+/// Refuses what came of a file where a build could not read it.
+fn check(client: &Client, job: &Job, planned: &Planned, half: &Path) -> Result<(), Fault> {
+    if matches!(planned.what, What::Whole { .. }) && is_page(half).map_err(|error| disk(half, &error))? {
+        return Err(page(&planned.written));
+    }
+    let Some(raster) = raster_of(job, &planned.written) else { return Ok(()) };
+    let is_tiff = matches!(planned.what, What::Window { .. });
+    match check_raster(client, raster, half) {
+        Err(Refused::Stopped(fault)) => Err(fault),
+        // Of a GeoTIFF the header was read before. Another raster's may be nothing without a file beside it.
+        Err(Refused::Header(_)) if !is_tiff => Ok(()),
+        Err(Refused::Header(found) | Refused::Heights(found)) => {
+            let found = found.replace(&half.display().to_string(), "what came of it");
+            let hint = "nothing of it is kept: run the same command again; where it is damaged again, it is so on its \
+                        server, and another source is needed";
+            Err(Fault::hinted(format!("{}: it cannot be read: {found}", planned.written), hint))
+        }
+        Ok(()) => Ok(()),
+    }
 }
 
 /// Writes a file, down to the disk.

@@ -88,6 +88,56 @@ fn a_database_of_fetched_sources_is_measured_where_its_lock_lies() {
 }
 
 #[test]
+fn what_arrives_damaged_is_dropped_and_comes_again() {
+    let (server, scene) = scene();
+    server.behave(Manner::Damaged);
+    for _ in 0..2 {
+        let said = scene.run_to(2, &["fetch", "a.toml", "--quiet"]);
+        assert!(said.stderr.contains("dem.tif: it cannot be read: ") && said.stderr.contains("nothing of it is kept"));
+        assert!(!said.stderr.contains("secret"), "{}", said.stderr);
+        assert_eq!(fs::read_dir(scene.path("a.sources")).unwrap().count(), 0);
+    }
+    server.behave(Manner::Sound);
+    scene.run_to(0, &["fetch", "a.toml", "--quiet"]);
+    scene.run_to(0, &["build", "a.toml", "--quiet"]);
+    // One that came before it was looked at, and is as the lock says.
+    let (path, place) = (scene.path("a.sources/dem.tif"), scene.path("a.lock"));
+    let (mut bytes, lock) = (fs::read(&path).unwrap(), fs::read_to_string(&place).unwrap());
+    let old = blake3(&bytes);
+    let middle = bytes.len() / 2;
+    bytes[middle..].fill(0xaa);
+    fs::write(&path, &bytes).unwrap();
+    fs::write(&place, lock.replace(&old, &blake3(&bytes))).unwrap();
+    let said = scene.run_to(0, &["fetch", "a.toml", "--quiet"]);
+    assert!(said.stdout.contains("is here"), "{}", said.stdout);
+    scene.refuses(&["build", "a.toml", "--fresh"], &["a.sources/dem.tif"]);
+    let said = scene.run_to(0, &["fetch", "a.toml", "--quiet", "--update"]);
+    assert!(!said.stdout.contains("is here"), "{}", said.stdout);
+    assert!(fs::read_to_string(&place).unwrap().contains(&old));
+    let said = scene.run_to(0, &["fetch", "a.toml", "--quiet", "--update"]);
+    assert!(said.stdout.contains("is here"), "{}", said.stdout);
+}
+
+fn blake3(bytes: &[u8]) -> String {
+    store::engine::Fingerprint::of_bytes(bytes).to_string()
+}
+
+#[test]
+fn a_page_to_log_in_on_is_no_source() {
+    let page = "\n<!DOCTYPE html><html><body>Log in</body></html>";
+    let server = FileServer::start(&[("roads.geojson", page.into()), ("sound.geojson", "{}".into())]);
+    let scene = Scene::new();
+    for (name, manner) in [("roads", Manner::Sound), ("roads", Manner::NoRanges), ("sound", Manner::Page)] {
+        server.behave(manner);
+        let features = format!("[features]\nsources = [\"{}/{name}.geojson\"]\n", server.host);
+        fs::write(scene.path("a.toml"), format!("{}{features}", job("\"whole.tif\"", 25.0))).unwrap();
+        let said = scene.run_to(2, &["fetch", "a.toml", "--quiet"]);
+        assert!(said.stderr.contains(&format!("{name}.geojson: found a web page (HTML)")), "{}", said.stderr);
+        assert!(!scene.path(&format!("a.sources/{name}.geojson")).exists());
+    }
+}
+
+#[test]
 fn an_overview_comes_where_its_posts_are_close_enough() {
     let (server, scene) = scene();
     fs::write(scene.path("b.toml"), job(&format!("\"{}/dem.tif\"", server.host), 62.5)).unwrap();

@@ -67,6 +67,10 @@ pub enum Manner {
     CutAfter(usize),
     /// Sends half of an answer, and then nothing more.
     Silent,
+    /// Sends other bytes than it has, but for the beginning of a file.
+    Damaged,
+    /// Sends a page to log in on.
+    Page,
     /// Gives 403 to requests without this access key.
     Closed(String),
 }
@@ -181,6 +185,10 @@ impl Shared {
         if let Manner::Redirect(to) = &manner {
             return stream.write_all(plain("302 Found", &format!("Location: {to}\r\n")).as_bytes());
         }
+        if manner == Manner::Page {
+            let head = "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: 6\r\n";
+            return stream.write_all(format!("{head}Connection: close\r\n\r\nLog in").as_bytes());
+        }
         let (_, bytes, etag) = file.unwrap();
         let total = if let Manner::Total(total) = manner { total } else { bytes.len() as u64 };
         let (first, last) = range.filter(|_| manner != Manner::NoRanges).unwrap_or((0, bytes.len() as u64 - 1));
@@ -189,6 +197,10 @@ impl Shared {
             return stream.write_all(plain("416 Range Not Satisfiable", "").as_bytes());
         }
         let mut body = bytes[first as usize..=last as usize].to_vec();
+        if manner == Manner::Damaged && 0 < first {
+            let middle = body.len() / 2;
+            body[middle..].fill(0xaa);
+        }
         let mut head = format!("ETag: {etag}\r\nConnection: close\r\n");
         let status = match range.filter(|_| manner != Manner::NoRanges) {
             None => "200 OK",
