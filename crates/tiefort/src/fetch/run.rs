@@ -27,7 +27,7 @@ use crate::failure::{Failure, Outcome};
 use crate::files::bytes_text;
 use crate::signals::Signals;
 use crate::steps::Steps;
-use crate::{files, signals, terminal};
+use crate::{files, fit, signals, terminal};
 
 /// What is to be fetched, and how.
 pub struct Options {
@@ -96,11 +96,20 @@ fn fetch_all(
         let message = format!("{} are to come, expected at most {} GB", bytes_text(left), options.max_gb);
         return Err(Failure::new(message, "--max-gb allows more; a coarser spacing_m needs fewer"));
     }
+    check_disk(&tasks, left, &Lock::folder(&job.path))?;
     files::make_folder(&Lock::folder(&job.path))?;
     bring_all(client, job, tasks, known, (options.quiet, left)).map_err(failed)?;
     let (place, path, came) = (Lock::place(&job.path), job.path.display(), bytes_text(client.received()));
     terminal::print(&format!("{came} came; {} says what; build it: tiefort build {path}\n", place.display()))?;
     Ok(Outcome::Sound)
+}
+
+/// Refuses what the disk has no room for: the ranges of a file lie beside what is put together from them.
+fn check_disk(tasks: &[Task], left: u64, folder: &Path) -> Result<(), Failure> {
+    let bytes = tasks.iter().map(|task| if let Task::Fetch(planned) = task { planned.bytes() } else { 0 });
+    let largest = bytes.max().unwrap_or(0);
+    let why = format!("that the {} to come take, with the largest file twice", bytes_text(left));
+    fit::check_disk(folder, left.saturating_add(largest), &why, "make room; a coarser spacing_m needs fewer bytes")
 }
 
 /// The files of other machines, each with the path that it gets here: names that two have are told apart.
