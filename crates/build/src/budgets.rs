@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use crate::ground::{GamingArea, Ground};
 use features::objects::Plan;
 use features::{AreaFeatures, Formed, Kind, Levelled};
-use job::Job;
+use job::{Job, LimitsSpec};
 use schedule::Workers;
 use store::Profile;
 use terrain::{LineStorey, QUANTA_PER_METRE, TileId};
@@ -47,6 +47,8 @@ pub struct Budgeted {
     pub lakes: [u32; 2],
     /// Triangles that features would take.
     pub triangles: u64,
+    /// Whether these are the limits of the job itself.
+    pub is_own: bool,
 }
 
 impl Budgeted {
@@ -114,10 +116,22 @@ impl Budgets {
     /// # Errors
     /// When the job is impossible with these limits.
     pub fn of_mean(&self, mean: u32) -> Result<Budgeted, CompileError> {
-        let [per_load_module, per_window] = limits_of(mean);
-        let mut job = self.job.clone();
-        (job.limits.mean_per_load_module, job.limits.per_load_module) = (f64::from(mean), per_load_module);
-        job.limits.window.limit = per_window;
+        let mut limits = self.job.limits;
+        [limits.per_load_module, limits.window.limit] = limits_of(mean);
+        limits.mean_per_load_module = f64::from(mean);
+        self.of_limits(limits)
+    }
+
+    /// What the limits of the job itself would keep.
+    ///
+    /// # Errors
+    /// When the job is impossible.
+    pub fn of_job(&self) -> Result<Budgeted, CompileError> {
+        self.of_limits(self.job.limits)
+    }
+
+    fn of_limits(&self, limits: LimitsSpec) -> Result<Budgeted, CompileError> {
+        let job = Job { limits, ..self.job.clone() };
         let Levelled { reserved, .. } = self.levelled(&job, &GamingArea::new(&job)?);
         let lakes = reserved.amounts.values();
         let lakes = lakes.fold([0; 2], |[kept, all], of| [kept + of.lakes_kept, all + of.lakes_wanted]);
@@ -126,7 +140,17 @@ impl Budgets {
         let main = reserved.amounts.values().filter(|of| of.is_main);
         let wide = main.fold([0; 2], |[wide, all], of| [wide + of.wide[1], all + of.wide[0]]);
         let (kinds, wide_m) = (self.kinds(&reserved.formed), wide.map(metres));
-        Ok(Budgeted { mean, per_load_module, per_window, kinds, wide_m, lakes, triangles })
+        Ok(Budgeted {
+            // A mean that is no whole number is told as the nearest one.
+            mean: limits.mean_per_load_module.round() as u32,
+            per_load_module: limits.per_load_module,
+            per_window: limits.window.limit,
+            kinds,
+            wide_m,
+            lakes,
+            triangles,
+            is_own: limits == self.job.limits,
+        })
     }
 
     /// Triangles of each load module that features take within the limits of the job itself, row by row.

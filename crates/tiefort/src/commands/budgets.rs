@@ -23,8 +23,8 @@ pub fn share([kept, all]: [f64; 2]) -> String {
     }
 }
 
-/// What budgets would keep of a job: of features up to the one that keeps all, of objects up to the first that keeps
-/// nearly all.
+/// What budgets would keep of a job: of features up to the one that keeps all, and that of the job; of objects up to
+/// the first that keeps nearly all.
 pub struct Tried {
     /// Of features; empty where there are none.
     pub features: Vec<Budgeted>,
@@ -62,6 +62,14 @@ fn of_features(budgets: &Budgets) -> Vec<Budgeted> {
             break;
         }
     }
+    with_own(tried, budgets.of_job().ok())
+}
+
+/// Budgets with that of the job itself in its place, where it is none of them.
+fn with_own(mut tried: Vec<Budgeted>, own: Option<Budgeted>) -> Vec<Budgeted> {
+    if let Some(own) = own.filter(|_| tried.iter().all(|of| !of.is_own)) {
+        tried.insert(tried.partition_point(|of| of.mean <= own.mean), own);
+    }
     tried
 }
 
@@ -74,16 +82,20 @@ pub fn wide(of: &Budgeted) -> Option<String> {
 pub fn table_text(budgets: &[Budgeted]) -> String {
     let Some(first) = budgets.first() else { return String::new() };
     let kinds: Vec<_> = first.kinds.iter().map(|(kind, _)| *kind).collect();
-    let mut table = Table::new(&vec![Align::Right; 5 + kinds.len()]);
+    let mut columns = vec![Align::Right; 5 + kinds.len()];
+    columns.push(Align::Left);
+    let mut table = Table::new(&columns);
     let names = kinds.iter().map(|kind| kind.name().to_owned());
     let head = ["mean".to_owned(), "most".to_owned()].into_iter().chain(names);
-    table.row(head.chain(["wide", "lakes", "triangles"].map(str::to_owned)));
+    table.row(head.chain(["wide", "lakes", "triangles", ""].map(str::to_owned)));
     for of in budgets {
         let metres = |kind| of.kinds.iter().find(|(other, _)| *other == kind).map_or([0.0; 2], |(_, metres)| *metres);
         let row = [of.mean, of.per_load_module].map(|count| grouped(count.into()));
         let lakes = if of.lakes[1] == 0 { "-".to_owned() } else { format!("{}/{}", of.lakes[0], of.lakes[1]) };
         let shares = kinds.iter().map(|kind| share(metres(*kind)));
-        table.row(row.into_iter().chain(shares).chain([wide(of).unwrap_or("-".into()), lakes, grouped(of.triangles)]));
+        let own = if of.is_own { "(this job)" } else { "" };
+        let last = [wide(of).unwrap_or("-".into()), lakes, grouped(of.triangles), own.into()];
+        table.row(row.into_iter().chain(shares).chain(last));
     }
     format!(
         "\nWhat budgets would keep of features: triangles of a load module on average and at most; the kept share of \
@@ -110,6 +122,7 @@ pub fn table_json(budgets: &[Budgeted]) -> Value {
             "lakes_of_1_ha": { "kept": budget.lakes[0], "all": budget.lakes[1] },
             "triangles": budget.triangles,
             "holds": budget.holds(),
+            "is_own": budget.is_own,
         })
     };
     budgets.iter().map(of).collect()
@@ -174,4 +187,35 @@ pub fn objects_json(tried: &[ObjectBudget]) -> Value {
                 "kinds": budget.kinds.iter().map(kind).collect::<Vec<_>>(), "holds": budget.holds() })
     };
     tried.iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn budgeted(mean: u32, is_own: bool) -> Budgeted {
+        Budgeted {
+            mean,
+            per_load_module: 3 * mean,
+            per_window: 128 * mean,
+            kinds: Vec::new(),
+            wide_m: [0.0; 2],
+            lakes: [0; 2],
+            triangles: u64::from(mean),
+            is_own,
+        }
+    }
+
+    #[test]
+    fn the_budget_of_the_job_stands_in_its_place_and_is_marked() {
+        let tried = |own: u32| {
+            let all = [32, 64].map(|mean| budgeted(mean, mean == own)).to_vec();
+            let all = with_own(all, Some(budgeted(own, true)));
+            let text = table_text(&all);
+            let marked: Vec<&str> = text.lines().filter(|line| line.ends_with("(this job)")).collect();
+            assert!(marked.len() == 1 && marked[0].trim_start().starts_with(&own.to_string()), "{text}");
+            all.iter().map(|of| of.mean).collect::<Vec<_>>()
+        };
+        assert_eq!([10, 50, 64, 100].map(tried), [vec![10, 32, 64], vec![32, 50, 64], vec![32, 64], vec![32, 64, 100]]);
+    }
 }
