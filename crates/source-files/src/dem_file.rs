@@ -167,6 +167,10 @@ impl DemFile {
         }
     }
 
+    pub(crate) fn frame_mut(&mut self) -> &mut RasterFrame {
+        &mut self.header.frame
+    }
+
     pub(crate) fn header(&self) -> &Header {
         &self.header
     }

@@ -209,6 +209,7 @@ fn place_of(frame: &RasterFrame, post: Post) -> [f64; 2] {
 
 /// A place in units of a raster's system as columns and rows from its south-west post, in fractions of a post.
 fn units_of(frame: &RasterFrame, place: [f64; 2]) -> [i64; 2] {
+    let place = frame.nearest(place);
     [0, 1].map(|axis| {
         ((place[axis] - frame.south_west[axis]) / frame.spacing[axis] * f64::from(TAP_UNITS)).round() as i64
     })

@@ -79,7 +79,17 @@ impl RasterFrame {
         [east + f64::from(col) * self.spacing[0], north + f64::from(row) * self.spacing[1]]
     }
 
-    /// The same for messages.
+    /// A place in units of the coordinate system; of degrees, which come around, by the longitude nearest to the
+    /// raster's middle.
+    pub fn nearest(&self, [mut east, north]: [f64; 2]) -> [f64; 2] {
+        if self.crs.is_geographic() {
+            let middle = self.south_west[0] + self.spacing[0] * f64::from(self.cols - 1) / 2.0;
+            east -= 360.0 * ((east - middle) / 360.0).round();
+        }
+        [east, north]
+    }
+
+    /// The place of a post, for messages.
     pub(crate) fn place_text(&self, row: u32, col: u32) -> String {
         let [east, north] = self.place(row, col);
         match self.crs.is_geographic() {

@@ -11,6 +11,7 @@ use crate::chunk::Meaning;
 use crate::crs::Crs;
 use crate::geoid::Shifts;
 use crate::join::{Standing, fits, join, overlaps};
+use crate::longitudes::to_one_run;
 use crate::samples::{Sample, each};
 use crate::warp::{Place, Warp};
 use crate::{DatumShift, DemFile, Raster, RasterFrame, Reach, SourceError};
@@ -96,12 +97,13 @@ impl Mosaic {
     /// # Errors
     /// When joined rasters are together too large.
     pub fn new(
-        rasters: Vec<Raster>,
+        mut rasters: Vec<Raster>,
         rules: MosaicRules,
         area: &Crs,
         grid: &GridFrame,
         rect: PostRect,
     ) -> Result<Self, SourceError> {
+        to_one_run(rasters.iter_mut().map(|raster| &mut raster.frame));
         let mut groups: Vec<Vec<Raster>> = Vec::new();
         for raster in rasters {
             match groups.last_mut() {

@@ -34,6 +34,8 @@ pub(crate) struct Warp {
     /// The grid's system, where it is not the raster's.
     other: Option<Crs>,
     net: Net,
+    /// Units of a turn around the Earth, where the raster is in degrees.
+    turn: Option<i64>,
 }
 
 /// Every so many posts of a grid, counted from easting and northing 0, whatever post is the grid's first.
@@ -69,19 +71,16 @@ impl Warp {
             step /= 2;
         }
         let other = (frame.crs != *area).then(|| area.clone());
-        Self { frame: frame.clone(), grid: *grid, other, net: Net::of(grid, step) }
+        let turn = (360.0 / frame.spacing[0] * f64::from(TAP_UNITS)).round() as i64;
+        let turn = frame.crs.is_geographic().then_some(turn);
+        Self { frame: frame.clone(), grid: *grid, other, net: Net::of(grid, step), turn }
     }
 
     /// The place of one post, projected.
     fn projected(&self, row: i32, col: i32) -> Place {
         let area = self.other.as_ref()?;
-        let [mut east, north] = area.to(&self.frame.crs, [self.grid.east_m(col), self.grid.north_m(row)])?;
-        let [west, south] = self.frame.south_west;
-        if self.frame.crs.is_geographic() {
-            // Longitudes come around: the one nearest to the raster's middle is meant.
-            let middle = west + self.frame.spacing[0] * f64::from(self.frame.cols) / 2.0;
-            east -= 360.0 * ((east - middle) / 360.0).round();
-        }
+        let place = area.to(&self.frame.crs, [self.grid.east_m(col), self.grid.north_m(row)])?;
+        let ([east, north], [west, south]) = (self.frame.nearest(place), self.frame.south_west);
         let units = |place: f64, first: f64, spacing: f64| {
             let units = (place - first) / spacing * f64::from(TAP_UNITS);
             (units.abs() < UNITS_MAX).then(|| (units / ROUNDED_UNITS).round() as i64 * ROUNDED_UNITS as i64)
@@ -90,7 +89,7 @@ impl Warp {
     }
 
     /// The places of all posts of a rectangle.
-    pub(crate) fn over(&self, rect: PostRect) -> Places {
+    pub(crate) fn over(&self, rect: PostRect) -> Places<'_> {
         if self.other.is_none() {
             let units = |posts: f64| {
                 let units = posts * f64::from(TAP_UNITS);
@@ -98,7 +97,7 @@ impl Warp {
             };
             let cols = (rect.west..=rect.east).map(|col| units(col_of(&self.frame, &self.grid, col))).collect();
             let rows = (rect.south..=rect.north).map(|row| units(row_of(&self.frame, &self.grid, row))).collect();
-            return Places { rect, kind: Kind::Aligned { cols, rows } };
+            return Places { warp: self, rect, kind: Kind::Aligned { cols, rows } };
         }
         let near = |axis: usize, post: i32| self.net.split(axis, post).0;
         let far = |axis: usize, post: i32| near(axis, post) + i32::from(0 < self.net.split(axis, post).1);
@@ -110,7 +109,29 @@ impl Warp {
         };
         let nodes = (lines.south..=lines.north).flat_map(|row| (lines.west..=lines.east).map(move |col| (row, col)));
         let places = nodes.map(|(row, col)| self.projected(self.net.post(1, row), self.net.post(0, col))).collect();
-        Places { rect, kind: Kind::Net { net: self.net, lines, places } }
+        Places { warp: self, rect, kind: Kind::Net { lines, places } }
+    }
+
+    /// Places beside each other without a turn between them: in a raster that goes around the Earth they may lie at
+    /// both of its ends, and those at the first are counted on from the last.
+    fn together(&self, places: [[i64; 2]; 4]) -> [[i64; 2]; 4] {
+        let cols = places.map(|[col, _]| col);
+        let west = cols.iter().fold(i64::MAX, |west, &col| west.min(col));
+        match self.turn {
+            Some(turn) if cols.iter().any(|col| turn / 2 < col - west) => {
+                places.map(|[col, row]| [if turn / 2 < col - west { col } else { col + turn }, row])
+            }
+            _ => places,
+        }
+    }
+
+    /// The same of a place among such: back at the first end where it lies beyond the last.
+    fn in_turn(&self, [col, row]: [i64; 2]) -> [i64; 2] {
+        let last = i64::from(self.frame.cols - 1) * i64::from(TAP_UNITS);
+        match self.turn {
+            Some(turn) if last < col && turn <= col => [col - turn, row],
+            _ => [col, row],
+        }
     }
 
     /// The posts of the raster under a rectangle of the grid, with `margin` posts around them; `None` when the raster
@@ -206,7 +227,8 @@ impl Reach {
 }
 
 /// The places of the posts of a rectangle in a raster.
-pub(crate) struct Places {
+pub(crate) struct Places<'a> {
+    warp: &'a Warp,
     rect: PostRect,
     kind: Kind,
 }
@@ -215,17 +237,18 @@ enum Kind {
     /// Rows run along rows: each axis by itself.
     Aligned { cols: Vec<Option<i64>>, rows: Vec<Option<i64>> },
     /// Between projected places, which lie on lines of a net.
-    Net { net: Net, lines: PostRect, places: Vec<Place> },
+    Net { lines: PostRect, places: Vec<Place> },
 }
 
-impl Places {
+impl Places<'_> {
     /// The place of one post of the rectangle.
     pub(crate) fn at(&self, row: i32, col: i32) -> Place {
         match &self.kind {
             Kind::Aligned { cols, rows } => {
                 Some([cols[(col - self.rect.west) as usize]?, rows[(row - self.rect.south) as usize]?])
             }
-            Kind::Net { net, lines, places } => {
+            Kind::Net { lines, places } => {
+                let net = self.warp.net;
                 let ((south, up), (west, right)) = (net.split(1, row), net.split(0, col));
                 let (up, right, step) = (i64::from(up), i64::from(right), net.step);
                 let place = |row: i32, col: i32| {
@@ -234,13 +257,13 @@ impl Places {
                 // A post on a projected line needs none beyond it.
                 let (north, east) = (south + i32::from(0 < up), west + i32::from(0 < right));
                 let corners = [place(south, west)?, place(south, east)?, place(north, west)?, place(north, east)?];
-                let n = i64::from(step);
-                Some([0, 1].map(|axis| {
+                let (corners, n) = (self.warp.together(corners), i64::from(step));
+                Some(self.warp.in_turn([0, 1].map(|axis| {
                     let [a, b, c, d] = corners.map(|corner| corner[axis]);
                     let sum = (a * (n - right) + b * right) * (n - up) + (c * (n - right) + d * right) * up;
                     // The step is a power of two, so this is the division by its square, rounded down.
                     (sum + n * n / 2) >> (2 * step.trailing_zeros())
-                }))
+                })))
             }
         }
     }

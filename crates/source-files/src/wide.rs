@@ -8,6 +8,7 @@ use terrain::{GridFrame, PostRect, QUANTA_PER_METRE};
 use crate::chunk::Header;
 use crate::crs::Crs;
 use crate::join::{Extent, common_kind, offset, shifted};
+use crate::longitudes::to_one_run;
 use crate::mosaic::{Beyond, Corner, Layer, MARGIN};
 use crate::samples::{Samples, union};
 use crate::warp::Warp;
@@ -49,11 +50,16 @@ impl WideMosaic {
     /// # Errors
     /// When joined rasters are together too large.
     pub fn new(
-        windows: Windows,
+        mut windows: Windows,
         used: &[(usize, f64)],
         rules: MosaicRules,
         (area, grid, rect): (&Crs, &GridFrame, PostRect),
     ) -> Result<Self, SourceError> {
+        // Files beside the area say nothing of how those in it lie together.
+        let mut is_used = vec![false; windows.files().len()];
+        used.iter().for_each(|&(file, _)| is_used[file] = true);
+        let frames = windows.files_mut().iter_mut().zip(is_used).filter(|(_, is_used)| *is_used);
+        to_one_run(frames.map(|(file, _)| file.frame_mut()));
         let header = |index: usize| windows.files()[index].header();
         let meaning = |index: usize| (&header(index).frame, (header(index).scale, &header(index).shift));
         let mut groups: Vec<Vec<(usize, f64)>> = Vec::new();

@@ -34,6 +34,10 @@ impl Windows {
         &self.files
     }
 
+    pub(crate) fn files_mut(&mut self) -> &mut [DemFile] {
+        &mut self.files
+    }
+
     /// How many strips or tiles were decoded so far, counting each time.
     pub fn decoded(&self) -> u64 {
         self.cache.decoded()

@@ -1,7 +1,7 @@
 //! Where an area lies that the job leaves open: around a place, or where its rasters have ground.
 
 use job::{AreaFound, AreaPlace, AreaRequest, Job, NoArea, SourceFile};
-use source_files::{Crs, DemFile, RasterFrame};
+use source_files::{Crs, DemFile, RasterFrame, turns};
 use terrain::Spacing;
 
 use crate::ground::source::reading;
@@ -109,10 +109,13 @@ pub fn utm_of(frames: &[RasterFrame]) -> Result<Crs, NoArea> {
         let [a, b] = [frame.place(0, 0), frame.place(frame.rows - 1, frame.cols - 1)];
         frame.crs.to(&wgs84, [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0])
     });
-    let middles: Vec<[f64; 2]> = middles.collect();
+    let mut middles: Vec<[f64; 2]> = middles.collect();
     if middles.is_empty() {
         return Err(no_area("no raster to take the UTM zone from".into()));
     }
+    // The mean of 179 east and 179 west is 180, and not 0.
+    let around = turns(&middles.iter().map(|&[longitude, _]| [longitude; 2]).collect::<Vec<_>>());
+    middles.iter_mut().zip(around).for_each(|(middle, turn)| middle[0] += turn);
     let mean = |axis: usize| middles.iter().map(|middle| middle[axis]).sum::<f64>() / middles.len() as f64;
     Crs::utm_at([mean(0), mean(1)]).map_err(no_area)
 }
@@ -132,11 +135,7 @@ impl Footprints<'_> {
         const BETWEEN: f64 = 0.501;
         let mut near = 0;
         for frame in self.frames {
-            let Some(mut at) = self.crs.to(&frame.crs, place) else { continue };
-            if frame.crs.is_geographic() {
-                let middle = frame.south_west[0] + frame.spacing[0] * f64::from(frame.cols) / 2.0;
-                at[0] -= 360.0 * ((at[0] - middle) / 360.0).round();
-            }
+            let Some(at) = self.crs.to(&frame.crs, place).map(|at| frame.nearest(at)) else { continue };
             let posts = [0, 1].map(|axis| (at[axis] - frame.south_west[axis]) / frame.spacing[axis]);
             let last = [f64::from(frame.cols - 1), f64::from(frame.rows - 1)];
             let outside = (0..2).map(|axis| (-posts[axis]).max(posts[axis] - last[axis])).fold(f64::MIN, f64::max);
@@ -287,6 +286,24 @@ mod tests {
         check(&[".##.", "####", "####", ".##."], Some([1, 0, 2, 4]));
         check(&["######", "#....#", "###..#"], Some([2, 0, 1, 6]));
         check(&["..###", "..###", "#####"], Some([0, 2, 3, 3]));
+    }
+
+    #[test]
+    fn the_zone_of_rasters_is_that_of_their_middle_where_longitudes_come_around() {
+        let frame = |west: f64| RasterFrame {
+            path: "a.tif".into(),
+            crs: Crs::wgs84(),
+            south_west: [west, -17.0],
+            spacing: [0.01; 2],
+            cols: 101,
+            rows: 101,
+        };
+        let zone = |wests: &[f64]| utm_of(&wests.iter().map(|&west| frame(west)).collect::<Vec<_>>()).unwrap().epsg();
+        assert_eq!(zone(&[179.0, -180.0]), Some(32701));
+        assert_eq!(zone(&[-180.0, 179.0, 178.0]), Some(32760));
+        assert_eq!(zone(&[241.5, -118.0]), Some(32711));
+        assert_eq!(zone(&[359.0, 0.0]), Some(32731));
+        assert_eq!(zone(&[-118.0, -117.0]), Some(32711));
     }
 
     #[test]

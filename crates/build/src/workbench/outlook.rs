@@ -178,12 +178,8 @@ impl Squares {
 }
 
 /// Whether a place in a raster's own system lies in it, or less than a post outside.
-fn holds(frame: &RasterFrame, [mut east, north]: [f64; 2]) -> bool {
-    let [west, south] = frame.south_west;
-    if frame.crs.is_geographic() {
-        let middle = west + frame.spacing[0] * f64::from(frame.cols) / 2.0;
-        east -= 360.0 * ((east - middle) / 360.0).round();
-    }
+fn holds(frame: &RasterFrame, place: [f64; 2]) -> bool {
+    let ([east, north], [west, south]) = (frame.nearest(place), frame.south_west);
     let inside = |posts: f64, count: u32| -1.0 < posts && posts < f64::from(count);
     inside((east - west) / frame.spacing[0], frame.cols) && inside((north - south) / frame.spacing[1], frame.rows)
 }

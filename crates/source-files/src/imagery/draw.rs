@@ -134,13 +134,8 @@ impl Imagery {
     /// The place of a corner of pixels.
     fn projected(&self, square: &Square, col: usize, row: usize) -> Place {
         let frame = &self.frame;
-        let [mut east, north] = square.crs.to(&frame.crs, square.place(col as f64, row as f64))?;
-        let [west, south] = frame.south_west;
-        if frame.crs.is_geographic() {
-            // Longitudes come around: the one nearest to the picture's middle is meant.
-            let middle = west + frame.spacing[0] * f64::from(frame.cols) / 2.0;
-            east -= 360.0 * ((east - middle) / 360.0).round();
-        }
+        let place = square.crs.to(&frame.crs, square.place(col as f64, row as f64))?;
+        let ([east, north], [west, south]) = (frame.nearest(place), frame.south_west);
         let up = (north - south) / frame.spacing[1] + 0.5;
         let down = if self.south_first { up } else { f64::from(frame.rows) - up };
         Some([(east - west) / frame.spacing[0] + 0.5, down])

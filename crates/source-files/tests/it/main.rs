@@ -8,6 +8,7 @@ mod formats;
 mod geoparquet;
 mod geotiff;
 mod hostile;
+mod longitudes;
 mod mosaics;
 mod osm;
 mod overlays;
