@@ -114,23 +114,12 @@ fn metadata(about: &About) -> String {
     )
 }
 
-/// Names of datums as [`plain_datum`] has them, and the EPSG code of heights above each, in
-/// metres.
-const VERTICAL_CODES: [(&str, u16); 8] = [
-    ("dhhn2016", 7837),
-    ("egm2008", 3855),
-    ("egm84", 5798),
-    ("egm96", 5773),
-    ("evrf2007", 5621),
-    ("evrf2019", 9389),
-    ("msl", 5714),
-    ("navd88", 5703),
-];
-
-/// EPSG code of heights above a datum, where it has one.
+/// EPSG code of heights in metres above a datum, where it has one.
 fn vertical_code(datum: &str) -> Option<u16> {
-    let plain = plain_datum(datum);
-    VERTICAL_CODES.iter().find(|(name, code)| plain == *name || plain == format!("epsg{code}")).map(|(_, code)| *code)
+    /// Heights above the mean level of the sea, which readers of rasters take for no datum.
+    const SEA_LEVEL: u16 = 5714;
+    let is_sea_level = matches!(plain_datum(datum).as_str(), "msl" | "epsg5714");
+    if is_sea_level { Some(SEA_LEVEL) } else { source_files::vertical_code(datum) }
 }
 
 /// Where the numbers lie.

@@ -36,6 +36,11 @@ impl Reading {
     /// Everything as the file says.
     pub const AS_IT_SAYS: Reading =
         Reading { crs: None, corner: None, height_unit_m: None, nodata: None, strict: false };
+
+    /// What the system that is said here measures heights from, whatever the file says.
+    fn vertical_datum(&self) -> Option<String> {
+        self.crs.as_ref().and_then(Crs::vertical_datum).map(str::to_owned)
+    }
 }
 
 /// A raster file whose headers were read and found good; no height is decoded yet.
@@ -87,7 +92,8 @@ impl DemFile {
         let tiff = GeoTiff::read_directory(store, reading.height_unit_m, crs)?;
         let mut header = tiff.header();
         header.nodata = reading.nodata.or(header.nodata);
-        let facts = Facts { format: "GeoTIFF", accuracy_m: None, vertical_datum: tiff.vertical_datum() };
+        let vertical_datum = reading.vertical_datum().or(tiff.vertical_datum());
+        let facts = Facts { format: "GeoTIFF", accuracy_m: None, vertical_datum };
         Ok(Self { header, facts, reader: Reader::GeoTiff(Box::new(tiff)) })
     }
 
@@ -223,7 +229,9 @@ impl Found {
             Reader::Ascii(grid) => grid.header(frame, unit_m),
         };
         header.nodata = reading.nodata.or(header.nodata);
-        Ok(DemFile { header, facts: self.facts, reader: self.reader })
+        let of_crs = header.frame.crs.vertical_datum().map(str::to_owned);
+        let vertical_datum = reading.vertical_datum().or(self.facts.vertical_datum).or(of_crs);
+        Ok(DemFile { header, facts: Facts { vertical_datum, ..self.facts }, reader: self.reader })
     }
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use terrain::{GridFrame, PostRect};
 
 use crate::SourceError;
+use crate::crs::datums::{datum_of_code, datum_of_system};
 use crate::crs::vertical::{FOOT_M, US_FOOT_M, unit_m};
 use crate::crs::{Crs, GeoKeys};
 
@@ -175,6 +176,7 @@ impl Axes {
 mod key {
     pub const RASTER_TYPE: u16 = 1025;
     pub const VERTICAL_TYPE: u16 = 4096;
+    pub const VERTICAL_DATUM: u16 = 4098;
     pub const VERTICAL_UNITS: u16 = 4099;
 }
 /// Code of a GeoKey whose meaning the file spells out by itself.
@@ -188,16 +190,12 @@ const STEP_MIN: f64 = 1.0e-9;
 const SHEAR_MAX: f64 = 1.0e-8;
 
 impl GeoTags {
-    /// What heights are measured from, for the few systems that have a name here.
+    /// What heights are measured from, by the code of their system, or else by that of their datum.
     pub(crate) fn vertical_datum(&self) -> Option<String> {
-        let name = match self.keys.short(key::VERTICAL_TYPE)? {
-            5773 => "EGM96",
-            3855 => "EGM2008",
-            5703 => "NAVD88",
-            4979 | 5030 => "ellipsoid",
-            _ => return None,
-        };
-        Some(name.to_owned())
+        match self.keys.short(key::VERTICAL_TYPE) {
+            None | Some(0 | USER_DEFINED) => datum_of_code(self.keys.short(key::VERTICAL_DATUM)?.into()),
+            Some(code) => datum_of_system(code.into()),
+        }
     }
 
     /// Whether a pixel's coordinates are those of its centre.

@@ -63,15 +63,10 @@ impl Geoid {
     }
 }
 
-/// A datum's name without what people write differently: `EGM 96` is `egm96`.
-pub fn plain_datum(name: &str) -> String {
-    name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase()
-}
-
 /// How heights above one datum become heights above another.
 #[derive(Clone, Debug)]
 pub struct DatumShift {
-    /// The datums' names, as [`plain_datum`] has them.
+    /// The datums' names, as [`plain_datum`](crate::plain_datum) has them.
     pub from: String,
     /// As `from`.
     pub to: String,

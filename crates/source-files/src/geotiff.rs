@@ -68,7 +68,7 @@ impl GeoTiff {
         let (frame, south_first) = RasterFrame::new(path, crs, &axes, layout.cols, layout.rows)?;
         let nodata = nodata(path, &mut decoder)?;
         let chunks = chunks(path, &mut decoder, &layout, store.len())?;
-        let vertical_datum = tags.vertical_datum();
+        let vertical_datum = tags.vertical_datum().or(frame.crs.vertical_datum().map(str::to_owned));
         Ok(Self { store: store.clone(), frame, scale, layout, nodata, south_first, chunks, vertical_datum })
     }
 

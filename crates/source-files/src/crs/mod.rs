@@ -6,11 +6,35 @@
 
 mod system;
 pub use system::Crs;
+pub(crate) mod datums;
+pub use datums::{plain_datum, vertical_code};
 mod geokeys;
 mod parameters;
 pub(crate) mod vertical;
 mod wkt;
+use datums::datum_of_system;
 pub(crate) use geokeys::GeoKeys;
+use system::Vertical;
+
+/// Compound systems that are younger than the table of systems: codes of each, of its places and of its heights.
+const COMPOUND: [(u16, u16, u16); 16] = [
+    (9286, 4258, 5709),
+    (9422, 4258, 9389),
+    (9424, 4258, 5701),
+    (9462, 7844, 9458),
+    (9463, 7844, 5711),
+    (9464, 4283, 5711),
+    (9505, 4258, 5782),
+    (9518, 4326, 3855),
+    (9527, 4167, 4440),
+    (9528, 4167, 7839),
+    (9705, 4326, 5714),
+    (9707, 4326, 5773),
+    (9897, 2169, 5774),
+    (9907, 4258, 5710),
+    (9924, 4258, 7837),
+    (10245, 4765, 8690),
+];
 
 impl Crs {
     /// The system with an EPSG code.
@@ -18,6 +42,10 @@ impl Crs {
     /// # Errors
     /// In words, what is wrong with it, when the code is not known or its system cannot be computed.
     pub fn from_epsg(code: u32) -> Result<Self, String> {
+        if let Some((_, places, heights)) = COMPOUND.iter().find(|(compound, ..)| u32::from(*compound) == code) {
+            let vertical = Vertical { unit_m: vertical::unit_m(*heights)?, datum: datum_of_system((*heights).into()) };
+            return Ok(Self::horizontal((*places).into())?.with_vertical(vertical));
+        }
         let known = system::known(code)?;
         if system::is_compound(&known) { wkt::read(known.wkt) } else { Self::horizontal(code) }
     }

@@ -3,6 +3,8 @@
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
+use super::datums::datum_of_system;
+
 /// A coordinate reference system with everything needed to compute with it.
 #[derive(Clone)]
 pub struct Crs {
@@ -10,9 +12,20 @@ pub struct Crs {
     name: String,
     definition: String,
     remark: Option<String>,
-    /// Metres in a unit of the heights of a compound system.
-    vertical_unit_m: Option<f64>,
+    /// The heights of a compound system.
+    vertical: Option<Vertical>,
+    /// What heights of a system of three dimensions are above.
+    ellipsoidal: Option<String>,
     proj: Proj,
+}
+
+/// What a compound system says of heights.
+#[derive(Clone, Debug)]
+pub(super) struct Vertical {
+    /// Metres in a unit of them.
+    pub unit_m: f64,
+    /// What they are measured from, where that is known.
+    pub datum: Option<String>,
 }
 
 impl std::fmt::Debug for Crs {
@@ -66,7 +79,9 @@ impl Crs {
         let definition = known.proj4.replace(" +nadgrids=@null", "").replace(" +wktext", "");
         // The library knows the scale by this name only.
         let definition = definition.replace("+k_0=", "+k=");
-        Self::new(definition, format!("EPSG:{code}"), Some(code))
+        let crs = Self::new(definition, format!("EPSG:{code}"), Some(code))?;
+        let is_three_dimensional = known.wkt.contains("CS[ellipsoidal,3]");
+        Ok(Self { ellipsoidal: is_three_dimensional.then(|| datum_of_system(code)).flatten(), ..crs })
     }
 
     /// A system from its PROJ definition.
@@ -83,12 +98,12 @@ impl Crs {
         if !proj.is_normalized_axis() {
             return Err("a system whose axes do not run east and north".into());
         }
-        Ok(Self { epsg, name, definition, remark, vertical_unit_m: None, proj })
+        Ok(Self { epsg, name, definition, remark, vertical: None, ellipsoidal: None, proj })
     }
 
-    /// The same with heights in a unit of so many metres, where a text says so.
-    pub(super) fn with_vertical_unit(self, vertical_unit_m: Option<f64>) -> Self {
-        Self { vertical_unit_m, ..self }
+    /// The same with heights, as a compound system says.
+    pub(super) fn with_vertical(self, vertical: Vertical) -> Self {
+        Self { vertical: Some(vertical), ..self }
     }
 
     /// Its EPSG code, where it has one.
@@ -113,7 +128,12 @@ impl Crs {
 
     /// Metres in a unit of heights, where it is a compound system, which says so.
     pub(crate) fn vertical_unit_m(&self) -> Option<f64> {
-        self.vertical_unit_m
+        self.vertical.as_ref().map(|vertical| vertical.unit_m)
+    }
+
+    /// What heights are measured from, where it is a system of heights, too, that says so.
+    pub(crate) fn vertical_datum(&self) -> Option<&str> {
+        self.vertical.as_ref().map_or(self.ellipsoidal.as_deref(), |vertical| vertical.datum.as_deref())
     }
 
     /// What a person should know about its datum.

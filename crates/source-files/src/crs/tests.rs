@@ -102,3 +102,28 @@ fn a_place_outside_a_projection_is_none_and_not_a_number() {
     assert_eq!(Crs::utm_at([180.0, 1.0]).unwrap().epsg(), Some(32601));
     assert!(Crs::utm_at([0.0, 88.0]).is_err());
 }
+
+#[test]
+fn a_compound_system_says_what_heights_are_measured_from() {
+    let found = |text: &str| {
+        let crs = Crs::named(text).unwrap();
+        (crs.vertical_datum().unwrap_or_default().to_owned(), crs.vertical_unit_m())
+    };
+    let metres = |name: &str| (name.to_owned(), Some(1.0));
+    assert_eq!(found("EPSG:7415"), metres("NAP"));
+    assert_eq!(found("EPSG:5498"), metres("NAVD88"));
+    assert_eq!(found("EPSG:9518"), metres("EGM2008"));
+    assert_eq!(found("EPSG:9705"), metres(""), "mean sea level is no datum");
+    assert_eq!(found("EPSG:8700"), ("NAVD88".into(), Some(vertical::FOOT_M)));
+    assert_eq!([found("EPSG:4979"), found("EPSG:4326")], [("ellipsoid".into(), None), (String::new(), None)]);
+    for (code, ..) in COMPOUND {
+        assert!(Crs::from_epsg(code.into()).is_ok(), "{code}");
+    }
+    let compound = |vertical: &str| format!(r#"COMPD_CS["x",{DEGREES},{vertical}]"#);
+    let coded = r#"VERT_CS["x",VERT_DATUM["x",2005],UNIT["metre",1],AUTHORITY["EPSG","7837"]]"#;
+    assert_eq!(found(&compound(coded)), metres("DHHN2016"));
+    let by_its_datum = r#"VERT_CS["x",VERT_DATUM["x",2005,AUTHORITY["EPSG","5103"]],UNIT["metre",1]]"#;
+    assert_eq!(found(&compound(by_its_datum)), metres("NAVD88"));
+    let by_name = r#"VERTCS["EGM96_Geoid",VDATUM["EGM96_Geoid"],UNIT["Meter",1.0]]"#;
+    assert_eq!(found(&format!("{DEGREES},{by_name}")), metres("EGM96"), "ESRI's writers put it behind");
+}

@@ -1,8 +1,9 @@
 //! Well-known text of coordinate systems, version 1, in the dialects of ESRI and GDAL; of version 2, only what names
 //! a code.
 
+use super::datums::{datum_in_name, datum_of_code, datum_of_system};
 use super::parameters::{Datum, Method, Parameters, datum_named};
-use super::system::Crs;
+use super::system::{Crs, Vertical};
 use super::vertical::unit_m;
 
 /// Longer texts describe no system in use.
@@ -26,13 +27,27 @@ pub(super) fn read(text: &str) -> Result<Crs, String> {
     let mut parser = Parser { rest: text.trim_start_matches('\u{feff}').trim(), depth: 0 };
     let root = parser.node()?;
     // ESRI's writers put the vertical system behind the other.
-    let mut vertical = root.vertical().map(unit_of_heights);
+    let mut vertical = root.vertical().map(heights);
     while vertical.is_none() && parser.rest.trim_start().starts_with(',') {
         parser.rest = parser.rest.trim_start().trim_start_matches(',').trim_start();
-        vertical = parser.node()?.vertical().map(unit_of_heights);
+        vertical = parser.node()?.vertical().map(heights);
     }
-    let vertical_unit_m = vertical.transpose()?;
-    Ok(system(&root)?.with_vertical_unit(vertical_unit_m))
+    let (vertical, crs) = (vertical.transpose()?, system(&root)?);
+    Ok(match vertical {
+        Some(vertical) => crs.with_vertical(vertical),
+        None => crs,
+    })
+}
+
+/// Unit and datum of a vertical system.
+fn heights(vertical: &Node) -> Result<Vertical, String> {
+    let datum_node = ["VERT_DATUM", "VDATUM", "VERTICALDATUM"].iter().find_map(|keyword| vertical.child(keyword));
+    let datum = match (vertical.code(), datum_node.and_then(Node::code)) {
+        (Some(code), _) => datum_of_system(code),
+        (None, Some(code)) => datum_of_code(code),
+        (None, None) => vertical.texts.first().and_then(|name| datum_in_name(name)),
+    };
+    Ok(Vertical { unit_m: unit_of_heights(vertical)?, datum })
 }
 
 /// Metres in a unit of a vertical system.

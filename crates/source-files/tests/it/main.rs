@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod alike;
+mod datums;
 mod formats;
 #[cfg(feature = "geoparquet")]
 mod geoparquet;

@@ -249,3 +249,40 @@ fn heights_come_to_another_datum_by_the_grids_that_the_job_names_and_not_without
     assert!(refused.contains("heights of dem.tif above EGM96, where EGM2008 is wanted"), "{refused}");
     assert!(refused.contains("a geoid grid of EGM96 to convert with"), "{refused}");
 }
+
+#[test]
+fn a_datum_is_one_whatever_its_unit_and_another_is_refused() {
+    let folder = TempDir::new().unwrap();
+    write_raster(folder.path());
+    let open = |said: &str| {
+        let dem =
+            format!("sources = [{{ file = \"dem.tif\", vertical_datum = \"{said}\" }}]\nvertical_datum = \"NAVD88\"");
+        open(&job(folder.path(), &dem, ""), u64::MAX)
+    };
+    for said in ["EPSG:5703", "EPSG:6360", "EPSG:8228"] {
+        assert_eq!(open(said).unwrap().1.warnings, Vec::<String>::new(), "{said}");
+    }
+    for said in ["EPSG:5702", "EPSG:7837", "EPSG:5760"] {
+        let refused = message(open(said));
+        assert!(refused.contains(&format!("above {said}, where NAVD88 is wanted")), "{refused}");
+    }
+}
+
+#[test]
+fn tiles_on_both_sides_of_the_180th_meridian_are_one_ground() {
+    let folder = TempDir::new().unwrap();
+    let bytes = 100_i16.to_be_bytes().repeat(1201 * 1201);
+    for name in ["S17E179.hgt", "S17W180.hgt"] {
+        std::fs::write(folder.path().join(name), &bytes).unwrap();
+    }
+    let text = "[area]\nname = \"a\"\ncrs = \"EPSG:32760\"\norigin_m = [818000, 8172000]\nsize_m = [5000, 2000]\n\
+                spacing_m = 25\n[dem]\nsources = [\"S17E179.hgt\", \"S17W180.hgt\"]\n";
+    let job = Job::from_text(text, &folder.path().join("job.toml")).unwrap();
+    for bytes in [u64::MAX, 0] {
+        let (area, ground) = open(&job, bytes).unwrap();
+        assert_eq!(ground.warnings, Vec::<String>::new());
+        let dem = ground.window(area.rect).unwrap().dem;
+        assert!(area.rect.posts().all(|post| !dem.is_void(post) && dem.height(post) == 12_800));
+    }
+    assert_eq!(crate::ground::foresee(&job, &GamingArea::new(&job).unwrap()).unwrap(), Vec::<String>::new());
+}
