@@ -1,6 +1,7 @@
 //! All features of one area, in the order in which things are decided: what they are and where they run, then, with the
 //! heights of the DEM at every station, how high they lie and what they put into the ground.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 use terrain::{Each, QUANTA_PER_METRE, SideSlope};
@@ -15,9 +16,9 @@ use crate::rules::Sorted;
 use crate::watersides::{Watersides, watersides};
 use crate::{
     About, Bed, Below, Earthworks, FallOptions, FeatureId, Flaw, GradeOptions, Graded, Grants, Histogram, Kind, Lake,
-    Network, Node, Outline, Pin, Place, Remark, Reserved, Rule, Shares, Shores, Site, Source, Storey, Strand, Traits,
-    Waters, Way, afloat, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along, level,
-    lift_shores, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
+    Network, Node, Outline, Pin, Place, Remark, Reserved, Role, Rule, Shares, Shores, Site, Source, Storey, Strand,
+    Traits, Waters, Way, afloat, banks, breaklines, channels, dams, fall, flowing, grade, have_line, lakes_along,
+    level, lift_shores, lines_inside, mend, outline_only, pins, reserve, round, shore, sides, sort_out, split_at_dams,
     travelled, water, with_water,
 };
 
@@ -247,18 +248,14 @@ impl AreaFeatures {
         water.extend(uncut(roads, (&self.deck_sides, &at), options.cut_max));
         let below = Below { water: &water, is_known: &|place| self.site.holds(place) };
         let heights = grade(roads, [&resting, &amid], &pins, below, options, &mut remarks);
-        let streams = crate::water(strands.iter().filter(|strand| strand.role == crate::Role::Channel));
-        let drowned = drowned(roads, &heights, &streams, &mut remarks);
-        // Their heights stay: what was a deck is a road that fills the stream's bed.
-        let roads = &*roads.with_storey(drowned, Storey::Ground);
+        let roads = &*with_culverts(roads, &heights, &strands, &mut remarks);
         let left = still_under(roads, &heights, (&self.deck_sides, &at), options.cut_max);
         let roads = &*roads.with_tunnels(&left);
         hills.extend(left);
         let through_hills = tell_of_hills(roads, &hills, &mut remarks);
         let beside = |(sides, height): (&[Place; 2], &i32)| sides.map(|place| at(place).unwrap_or(*height));
         let beside: Vec<[i32; 2]> = self.road_sides.iter().zip(&heights).map(beside).collect();
-        let grants = Grants::default();
-        let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &grants };
+        let graded = Graded { network: roads, heights: &heights, beside: &beside, grants: &Grants::default() };
         let kinds = self.traits_by_id();
         let about = |id: FeatureId| {
             let name = self.names.get(&id).copied().unwrap_or(0);
@@ -410,6 +407,17 @@ fn ground_of(network: &Network, at: Ground, near: Ground) -> Vec<Option<i32>> {
     ground
 }
 
+/// The network with roads at the heights of short bridges that lie below streams, which pass there in culverts.
+fn with_culverts<'a>(
+    network: &'a Network,
+    heights: &[i32],
+    strands: &[Strand],
+    remarks: &mut [Remark],
+) -> Cow<'a, Network> {
+    let streams = water(strands.iter().filter(|strand| strand.role == Role::Channel));
+    network.with_storey(drowned(network, heights, &streams, remarks), Storey::Ground)
+}
+
 /// The middle one of heights.
 fn middle_of(mut heights: [i32; 5]) -> i32 {
     heights.sort_unstable();
@@ -441,7 +449,6 @@ fn a_post_aside(network: &Network) -> Vec<[Place; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Role;
     use terrain::in_turn;
 
     use crate::samples::{self, ground_at, level_usual, site, way};

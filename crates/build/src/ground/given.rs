@@ -470,21 +470,12 @@ fn refuse_fixed(
     let is_corner = at.row % side == 0 && at.col % side == 0;
     let step = job.outer_step_cells();
     let on_border = area.rect.has_on_border(at) && at.row % step == 0 && at.col % step == 0;
-    match (is_corner, on_border) {
-        (true, _) => Err(wrong(
-            &file.path,
-            feature,
-            &format!("a forbidden post, {at}, that is a corner of load modules"),
-            "another",
-        )),
-        (_, true) => Err(wrong(
-            &file.path,
-            feature,
-            &format!("a forbidden post, {at}, that is a point of the outer border"),
-            "another",
-        )),
-        _ => Ok(()),
-    }
+    let fixed = match (is_corner, on_border) {
+        (true, _) => "a corner of load modules",
+        (_, true) => "a point of the outer border",
+        _ => return Ok(()),
+    };
+    Err(wrong(&file.path, feature, &format!("a forbidden post, {at}, that is {fixed}"), "another"))
 }
 
 /// `error` with another hint.

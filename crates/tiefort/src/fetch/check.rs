@@ -52,13 +52,6 @@ fn begins_page(head: &[u8]) -> bool {
     [&b"<!doctype html"[..], b"<html"].iter().any(|start| head.starts_with(start))
 }
 
-/// A web page in the place of a file.
-pub fn page(shown: &str) -> Fault {
-    let hint = "open the address in a browser: it may ask to log in or to agree to terms; take an address that gives \
-                the file itself, or fetch it by other means and name it by its path";
-    Fault::hinted(format!("{shown}: found a web page (HTML), expected the file"), hint)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

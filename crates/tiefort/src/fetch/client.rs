@@ -10,8 +10,7 @@ use ureq::http::{HeaderMap, Response};
 use ureq::{Agent, Timeout};
 
 use super::address::Address;
-use super::check::page;
-use super::fault::{Fault, changed};
+use super::fault::{Fault, changed, page};
 use super::s3::{Credentials, Listed, fits, listed};
 use super::silence::{Heard, Silence};
 use crate::clock::now;

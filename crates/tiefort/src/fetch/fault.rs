@@ -65,3 +65,10 @@ pub fn changed(address: &str, wanted: &str, found: &str) -> Fault {
     let text = format!("{address}: it has changed on the server: found version {found}, expected {wanted}");
     Fault { kind: Kind::Changed, ..Fault::hinted(text, "tiefort fetch --update takes the new one") }
 }
+
+/// A web page in the place of a file.
+pub fn page(shown: &str) -> Fault {
+    let hint = "open the address in a browser: it may ask to log in or to agree to terms; take an address that gives \
+                the file itself, or fetch it by other means and name it by its path";
+    Fault::hinted(format!("{shown}: found a web page (HTML), expected the file"), hint)
+}

@@ -15,9 +15,9 @@ use schedule::Workers;
 use source_files::GeoParquet;
 use store::engine::Fingerprint;
 
-use super::check::{Refused, check_raster, is_page, page};
+use super::check::{Refused, check_raster, is_page};
 use super::client::{Client, Patience, REQUESTS};
-use super::fault::Fault;
+use super::fault::{Fault, page};
 use super::pieces::Piece;
 use super::plan::{Kept, Planned, What, disk, kept, plan, raster_of, stopped_or};
 use super::silence;
