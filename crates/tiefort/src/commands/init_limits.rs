@@ -56,12 +56,13 @@ impl Limits {
     pub fn comment(&self) -> String {
         let mut text = String::new();
         if !self.budgets.is_empty() {
-            text += "# What budgets would keep of the length of roads and rivers, and of lakes of\n# 1 ha and more:\n";
+            text += "# What budgets would keep of the length of roads and rivers, of main roads and\n\
+                     # rails in their width (wide), and of lakes of 1 ha and more:\n";
         }
         for of in &self.budgets {
             let lakes =
                 if of.lakes[1] == 0 { String::new() } else { format!(", {} of {} lakes", of.lakes[0], of.lakes[1]) };
-            let wide = wide(of).map_or(String::new(), |share| format!(", {share} of main roads in their width"));
+            let wide = wide(of).map_or(String::new(), |share| format!(", {share} wide"));
             let chosen = if of.mean == self.mean { "  (this job)" } else { "" };
             text += &format!("#   mean {:>4}: {:>5}{wide}{lakes}{chosen}\n", of.mean, share(of.metres(|_| true)));
         }

@@ -80,7 +80,7 @@ impl Facets {
     /// The facets of a scene with what stands on its ground, and with the bands of its ways around a place, in metres
     /// from the area's south-west post. Maps draw both otherwise, and objects of a large area take more memory than all
     /// else.
-    pub(crate) fn as_seen_from(self, scene: &Scene, place_m: [f64; 2]) -> Self {
+    pub(crate) fn seen_from(self, scene: &Scene, place_m: [f64; 2]) -> Self {
         let bands = scene.features.map(|features| bands_of(scene, &features, place_m)).unwrap_or_default();
         let corner =
             |module: &LoadModule| [module.id.col, module.id.row].map(|index| f64::from(index) * scene.side_m());

@@ -50,7 +50,7 @@ const PITCH: f64 = -2.0;
 pub fn draw_sight(scene: &Scene, shown: Shown, style: Style, sight: &Sight, wide: usize) -> Image {
     let facets = Facets::of_scene(scene);
     let place_m = place_m(scene, facets.extent_m, sight);
-    let facets = facets.as_seen_from(scene, place_m);
+    let facets = facets.seen_from(scene, place_m);
     let covers = scene.ground.map(|ground| facets.post_covers(ground.dem, scene.frame.spacing.metres()));
     let triangles = Surface::Triangles(&facets);
     let tin = || Panel { label: format!("TIN, {}", scene.triangles_in_words()), surface: triangles };
