@@ -232,36 +232,12 @@ fn in_culverts(middle: Middle, points: &[(Place, i32)]) -> Vec<Middle> {
     let is_below: Vec<bool> = stations.windows(2).map(|ends| ends.iter().any(passes)).collect();
     let mut from = 0;
     let parts = is_below.chunk_by(|a, b| a == b).map(|same| {
-        let mut stations = stations[from..=from + same.len()].to_vec();
+        let stations = stations[from..=from + same.len()].to_vec();
         from += same.len();
-        if same[0] {
-            run_below(&mut stations, points);
-        }
         let culvert = LineTraits { form: LineForm::Nothing, storey: LineStorey::Tunnel, is_in_ground: false, ..traits };
         Middle { class, traits: if same[0] { culvert } else { traits }, id, stations }
     });
     parts.collect()
-}
-
-/// Lowers a culvert below what it passes: straight between its ends and the roads over it, where it is not below that
-/// already. Its own heights are those of the natural ground, which a road in a cut lies below.
-fn run_below(stations: &mut [(Place, i32)], points: &[(Place, i32)]) {
-    let over = |place: &Place| {
-        let found = points.binary_search_by_key(place, |(other, _)| *other).ok()?;
-        Some(points[found].1)
-    };
-    let mut known = 0;
-    for at in 0..stations.len() {
-        let Some(over) = over(&stations[at].0).or_else(|| (at + 1 == stations.len()).then_some(stations[at].1)) else {
-            continue;
-        };
-        stations[at].1 = stations[at].1.min(over);
-        let ends = [stations[known], stations[at]];
-        for (place, height) in &mut stations[known + 1..at.max(known + 1)] {
-            *height = (*height).min(between(ends.map(|(place, _)| place), ends.map(|(_, height)| height), *place));
-        }
-        known = at;
-    }
 }
 
 /// Places at which the middle of what is kept ends although its way goes on, with its class and its feature. `family`
