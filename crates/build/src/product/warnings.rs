@@ -61,9 +61,11 @@ pub(crate) const MATTERS: [Matter; 27] = [
         "networks are no longer whole; larger limits keep them, as tiefort plan tells",
     ),
     matter(
-        "more than 5 % of the length of a main class, and 100 m, that has no room for its width",
+        "more than 5 % of the length of a main class, and 100 m, that has no room for its width, at 64 triangles a \
+         load module and more",
         Told::Warning(without_width),
-        "it is a line and tilts as the hillside does; larger limits lay it flat across, as tiefort plan tells",
+        "it is a line and tilts as the hillside does; larger limits lay it flat across, as tiefort plan tells. With \
+         fewer triangles no way has its width",
     ),
     matter(
         "more than 5 % of what objects of a kind hide left out for [objects.limits]",
@@ -328,7 +330,11 @@ fn left_out_of(job: &Job, level: &AreaLevel) -> Vec<String> {
 /// Main ways are lines for want of room.
 fn without_width(made: &Made) -> Vec<String> {
     const LEAST_M: f64 = 100.0;
-    let Some((job, level)) = made.features else { return Vec::new() };
+    /// Triangles of a load module below which hardly any way has its width, as with the limits of SIMNET.
+    const MEAN_MIN: f64 = 64.0;
+    let Some((job, level)) = made.features.filter(|(job, _)| MEAN_MIN <= job.limits.mean_per_load_module) else {
+        return Vec::new();
+    };
     let names = job.class_names();
     let narrow = level.amounts.iter().filter(|of| of.is_main && of.wide_m[1] < WIDE_MIN * of.wide_m[0]);
     let narrow = narrow.filter(|of| LEAST_M < of.wide_m[0] - of.wide_m[1]);
@@ -434,6 +440,28 @@ mod tests {
         let bad = AreaLevel { remarks: vec![remark(true); 2], earthworks: over(478.0), ..AreaLevel::default() };
         let [open, holes] = &told(&bad)[..] else { panic!("both are told") };
         assert!(open.contains("do not meet: 1;") && holes.starts_with("0.5 km of ways"), "{open} {holes}");
+    }
+
+    #[test]
+    fn main_roads_without_their_width_are_told_where_limits_could_hold_it() {
+        let told = |mean: u32, class: f64| {
+            let text = format!(
+                "[area]\nname = \"a\"\ncrs = \"EPSG:32611\"\norigin_m = [0, 0]\nsize_m = [3000, 3000]\nspacing_m = \
+                 12.5\n[dem]\nsource = \"sample\"\n[limits]\nmean_per_load_module = {mean}\nper_load_module = 750\n"
+            );
+            let job = Job::from_text(&text, Path::new("a.toml")).unwrap();
+            let amounts = FeatureAmounts {
+                is_main: true,
+                kept_m: 9e3,
+                wanted_m: 9e3,
+                wide_m: [9e3, class],
+                ..FeatureAmounts::default()
+            };
+            let level = AreaLevel { amounts: vec![amounts], ..AreaLevel::default() };
+            let report = report(Some(ReportFeatureChecks::default()));
+            warnings(&Made { report: &report, features: Some((&job, &level)) }).len()
+        };
+        assert_eq!([told(250, 0.0), told(250, 8.9e3), told(32, 0.0)], [1, 0, 0]);
     }
 
     #[test]
