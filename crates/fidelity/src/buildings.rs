@@ -1,9 +1,8 @@
 //! Roads that run through buildings.
 
-use terrain::{Corner, LineKind, LineStorey, LoadModule, ModuleLine, ModuleVertex, ObjectKind, Prism};
+use terrain::{Corner, LineKind, LineStorey, LoadModule, ModuleLine, ObjectKind, Prism};
 
-/// Quanta between the places of a road that are looked at: a metre.
-const SAMPLE: f64 = 128.0;
+use crate::decks::places_along;
 
 /// How far above a road a building may begin and still stand in its way, in quanta: 2 m.
 const HEADROOM: i32 = 256;
@@ -24,7 +23,7 @@ pub fn metres_in_buildings(module: &LoadModule) -> u64 {
             near && f64::from(prism.base) <= z + f64::from(HEADROOM) && holds(prism, [x, y])
         })
     };
-    let places = module.lines.iter().filter(is_road).flat_map(|line| line.vertices.windows(2)).flat_map(places);
+    let places = module.lines.iter().filter(is_road).flat_map(places_along);
     if buildings.is_empty() { 0 } else { places.filter(is_inside).count() as u64 }
 }
 
@@ -47,17 +46,9 @@ fn holds(prism: &Prism, [x, y]: [f64; 2]) -> bool {
     sides.filter(|side| crosses(*side)).count() % 2 == 1
 }
 
-/// Places in the middles of parts of a segment, a metre long at most.
-fn places(ends: &[ModuleVertex]) -> impl Iterator<Item = [f64; 3]> + use<> {
-    let [a, b] = [0, 1].map(|end| [ends[end].x.into(), ends[end].y.into(), f64::from(ends[end].z)]);
-    let count = (f64::hypot(b[0] - a[0], b[1] - a[1]) / SAMPLE).round().max(1.0);
-    (0..count as u32)
-        .map(move |part| [0, 1, 2].map(|axis| a[axis] + (f64::from(part) + 0.5) / count * (b[axis] - a[axis])))
-}
-
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, LineForm, LineTraits, ModuleId, ModuleResidual, Objects};
+    use terrain::{Decks, LineForm, LineTraits, ModuleId, ModuleResidual, ModuleVertex, Objects};
 
     use super::*;
 

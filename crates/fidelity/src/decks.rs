@@ -156,7 +156,7 @@ fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
     let is_apart = |[x, y, _]: [f64; 3]| ends.iter().all(|end| APART < (x - end[0]).hypot(y - end[1]));
     let mut found = Vec::new();
     for line in module.lines.iter().filter(|line| is_below(line)) {
-        for place in segments(line).iter().flat_map(Segment::samples).filter(|place| is_apart(*place)) {
+        for place in places_along(line).filter(|place| is_apart(*place)) {
             let over = decks.iter().filter_map(|deck| height_in(*deck, [place[0], place[1]]));
             found.extend(over.map(|height| (line.class, (height - place[2]).floor() as i32)));
         }
@@ -267,13 +267,18 @@ fn segments(line: &ModuleLine) -> Vec<Segment> {
     line.vertices.windows(2).enumerate().map(segment).collect()
 }
 
+/// Places along a line, a metre apart at most, its last vertex left out.
+pub(crate) fn places_along(line: &ModuleLine) -> impl Iterator<Item = [f64; 3]> + use<> {
+    segments(line).into_iter().flat_map(|segment| segment.samples())
+}
+
 impl Segment {
     fn place(vertex: &ModuleVertex) -> [f64; 3] {
         [f64::from(vertex.x), f64::from(vertex.y), f64::from(vertex.z)]
     }
 
     /// Places along it, a metre apart at most, the last vertex left out.
-    fn samples(&self) -> impl Iterator<Item = [f64; 3]> {
+    fn samples(self) -> impl Iterator<Item = [f64; 3]> {
         let [a, b] = self.places;
         let count = ((b[0] - a[0]).hypot(b[1] - a[1]) / f64::from(SAMPLE)).ceil();
         let place = move |step: u32| [0, 1, 2].map(|axis| a[axis] + f64::from(step) / count * (b[axis] - a[axis]));

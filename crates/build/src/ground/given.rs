@@ -124,34 +124,35 @@ impl Given {
     }
 
     /// Which heights that files give lie on roads or in water, whose own heights hold: the first, and how many.
-    /// `class_at` tells the class of the feature at a post of a tile.
+    /// `classes_at` tells the classes of the features at posts of a tile.
     ///
     /// # Errors
-    /// Those of `class_at`.
+    /// Those of `classes_at`.
     pub fn on_features<E>(
         &self,
         area: &GamingArea,
         names: &[String],
-        class_at: impl Fn(TileId, Post) -> Result<Option<u8>, E>,
+        classes_at: impl Fn(TileId, &[Post]) -> Result<Vec<Option<u8>>, E>,
     ) -> Result<Option<String>, E> {
-        let (mut first, mut count) = (None, 0);
-        for told in self.heights.iter().filter(|told| !(self.outer_is_fixed && area.rect.has_on_border(told.at))) {
-            let Some(&tile) = area.tiles.iter().find(|&&tile| area.tiling.rect(tile).contains(told.at)) else {
-                continue;
-            };
-            if let Some(class) = class_at(tile, told.at)? {
-                count += 1;
-                first.get_or_insert((told, class));
+        let is_free = |told: &&HeightTold| !(self.outer_is_fixed && area.rect.has_on_border(told.at));
+        let mut left: Vec<&HeightTold> = self.heights.iter().filter(is_free).collect();
+        let mut found = Vec::new();
+        for &tile in &area.tiles {
+            let rect = area.tiling.rect(tile);
+            let (here, others) = left.into_iter().partition::<Vec<_>, _>(|told| rect.contains(told.at));
+            left = others;
+            if !here.is_empty() {
+                let posts: Vec<Post> = here.iter().map(|told| told.at).collect();
+                let classes = classes_at(tile, &posts)?;
+                found.extend(here.into_iter().zip(classes).filter_map(|(told, class)| Some((told, class?))));
             }
         }
+        let first = found.iter().min_by_key(|(told, _)| told.at);
         Ok(first.map(|(told, class)| {
-            let name = names.get(usize::from(class)).map_or("a class", String::as_str);
-            let others = if 1 < count { format!("; {count} such heights in all") } else { String::new() };
-            format!(
-                "{}: a height of {:.2} m lies on {name}, whose own height holds there{others}",
-                told.place,
-                metres_of_quanta(told.quanta)
-            )
+            let name = names.get(usize::from(*class)).map_or("a class", String::as_str);
+            let (place, height_m) = (&told.place, metres_of_quanta(told.quanta));
+            let all = if found.len() == 1 { String::new() } else { format!("; {} such heights in all", found.len()) };
+            format!("{place}: a height of {height_m:.2} m lies on {name}, whose own height holds there{all}")
         }))
     }
 

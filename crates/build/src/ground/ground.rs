@@ -190,12 +190,12 @@ impl Ground {
     /// # Errors
     /// When the source has no heights there, or features cannot be read.
     pub fn given_on_features(&self, area: &GamingArea, names: &[String]) -> Result<Option<String>, GroundError> {
-        let class_at = |tile: TileId, post: Post| -> Result<Option<u8>, GroundError> {
+        let classes_at = |tile: TileId, posts: &[Post]| -> Result<Vec<Option<u8>>, GroundError> {
             let window = self.tile(area, tile)?;
-            let is_decided = window.decided.binary_search(&post).is_ok();
-            Ok(is_decided.then(|| window.importance.class(post)))
+            let is_decided = |post: &Post| window.decided.binary_search(post).is_ok();
+            Ok(posts.iter().map(|post| is_decided(post).then(|| window.importance.class(*post))).collect())
         };
-        if self.lines.get().is_none() { Ok(None) } else { self.given.on_features(area, names, class_at) }
+        if self.lines.get().is_none() { Ok(None) } else { self.given.on_features(area, names, classes_at) }
     }
 
     /// What heights lie within: those of the sources, and what the job says itself of water.
