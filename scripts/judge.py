@@ -247,11 +247,14 @@ def deck_cracks(database):
 
 
 def deck_ends(module, across, line):
-    """Vertices of decks on a line between load modules: place along it and height."""
+    """Vertices of edges of decks along a line between load modules: place along it and height. A deck that ends at it in
+    one corner has none."""
     if not module.decks:
         return set()
     on, along = (module.decks.x, module.decks.y) if across else (module.decks.y, module.decks.x)
-    there = on == line
+    of = module.decks.triangles
+    there = of[(on[of] == line).sum(axis=1) == 2]
+    there = there[on[there] == line]
     return set(zip(along[there].tolist(), module.decks.z[there].tolist()))
 
 
