@@ -1,4 +1,5 @@
-//! Joins ends of ways that miss another way by less than a metre.
+//! Joins ends of ways that miss another way by less than a metre, or end on the other's carriageway: two heights there
+//! would be a cliff in the road.
 
 use std::collections::HashMap;
 
@@ -21,7 +22,8 @@ pub fn family(kind: Kind) -> u8 {
     }
 }
 
-/// Moves dangling ends to the nearest vertex or segment of another way of their family within a metre.
+/// Moves dangling ends to the nearest vertex or segment of another way of their family: within a metre, half of the
+/// other's width, or, to another dangling end, half of both widths.
 pub fn join(ways: &mut [Way], lattice: FeatureLattice, remarks: &mut Vec<Remark>) {
     for family_number in [0, 1, 2] {
         let numbers: Vec<usize> =
@@ -75,7 +77,11 @@ fn moves(ways: &[Way], numbers: &[usize], lattice: FeatureLattice) -> Vec<Move> 
             owners.push(number);
         }
     }
-    let reach = lattice.steps_in(NEAR_M).max(1);
+    // A step more, since both have been rounded.
+    let near = lattice.steps_in(NEAR_M) + 1;
+    let half = |number: usize| i64::from(ways[number].traits.width / (2 * lattice.quanta_per_step()));
+    let widest = numbers.iter().map(|number| half(*number)).max().unwrap_or(0);
+    let reach = near.max(2 * widest);
     let mut nearest: Vec<Option<Move>> = vec![None; ends.len()];
     places_near(&segments, &places, reach, &mut |segment, place| {
         let (owner, (way, last)) = (owners[segment as usize], ends[place as usize]);
@@ -84,6 +90,11 @@ fn moves(ways: &[Way], numbers: &[usize], lattice: FeatureLattice) -> Vec<Move> 
             return;
         }
         let Some(to) = target(&segments[segment as usize], from, reach) else { return };
+        let both = if dangling.contains(&to) { half(way) } else { 0 };
+        let reach = if is_ahead(&ways[way].places, last, to) { near.max(half(owner) + both) } else { near };
+        if reach * reach < from.squared_to(to) {
+            return;
+        }
         // Of two dangling ends one goes to the other.
         if from == to || (dangling.contains(&to) && from < to) {
             return;
@@ -95,6 +106,17 @@ fn moves(ways: &[Way], numbers: &[usize], lattice: FeatureLattice) -> Vec<Move> 
         }
     });
     nearest.into_iter().flatten().filter(|found| ways[found.way].places.len() != 2 || !folds(ways, found)).collect()
+}
+
+/// Whether a way leads from its end to a place, within 60 degrees: one that ends beside another does not miss it.
+fn is_ahead(places: &[Place], last: bool, to: Place) -> bool {
+    let (end, before) = match last {
+        true => (places[places.len() - 1], places[places.len() - 2]),
+        false => (places[0], places[1]),
+    };
+    let ([east, north], [to_east, to_north]) = (before.to(end), end.to(to));
+    let along = i128::from(east * to_east + north * to_north);
+    0 < along && i128::from(before.squared_to(end)) * i128::from(end.squared_to(to)) <= 4 * along * along
 }
 
 /// Whether a way of two places would lose its length.

@@ -255,7 +255,9 @@ mod tests {
         let rounded = check(vec![through, stub], 2, &[(Flaw::Gap, Remedy::Joined)]);
         let end = *rounded.ways.iter().find(|way| way.id.number == 2).unwrap().places.last().unwrap();
         assert!(rounded.ways.iter().find(|way| way.id.number == 1).unwrap().places.contains(&end));
-        let far = road(2, &[(5.0, 5.0), (5.0, 1.1)]);
+        let on_it = road(2, &[(5.0, 5.0), (5.0, 1.1)]);
+        check(vec![road(1, &[(1.0, 1.0), (9.0, 1.0)]), on_it], 2, &[(Flaw::Gap, Remedy::Joined)]);
+        let far = road(2, &[(5.0, 5.0), (5.0, 1.25)]);
         check(vec![road(1, &[(1.0, 1.0), (9.0, 1.0)]), far], 2, &[]);
     }
 

@@ -96,15 +96,19 @@ impl Network {
             }
         }
         let (starts, beside) = neighbours(nodes.len(), &edges);
-        // A deck that ends in the air, where no other way takes it on, rests on the ground there; a tunnel that does,
-        // as where the area ends, is inside a hill.
+        // A deck that ends in the air, where no other way takes it on, rests on the ground there, and so does one that
+        // runs on in a tunnel; a tunnel that ends so, as where the area ends, is inside a hill.
         let is_tunnel = |edge: u32| {
             let way = &ways[edges[edge as usize].way as usize];
             matches!(way.traits.storey, Storey::Tunnel(_))
         };
         for (number, node) in nodes.iter_mut().enumerate() {
             let of_node = &beside[starts[number] as usize..starts[number + 1] as usize];
-            node.on_ground |= matches!(of_node, &[(_, edge)] if !is_tunnel(edge));
+            let is_portal = of_node.iter().any(|(_, edge)| is_tunnel(*edge));
+            node.on_ground |= match of_node {
+                &[(_, edge)] => !is_tunnel(edge),
+                _ => is_portal && !of_node.iter().all(|(_, edge)| is_tunnel(*edge)),
+            };
         }
         let ways = ways.iter().map(|way| WayOf { traits: way.traits, id: way.id }).collect();
         let mut network = Self { nodes, edges, ways, lattice, starts, beside };
@@ -229,6 +233,12 @@ impl Network {
     pub(crate) fn relaxed_max(&self, edge: u32) -> i32 {
         let give = i64::from(self.traits(edge).grade_give);
         (i64::from(self.edges[edge as usize].rise_max) * give / 1000) as i32
+    }
+
+    /// The same were nothing of it level for what meets it.
+    pub(crate) fn steepest(&self, edge: u32) -> i32 {
+        let [from, to] = self.ends(edge).map(|node| self.nodes[node as usize].place);
+        self.lattice.rise_max(from, to, self.traits(edge).grade_most_ppm(), 0)
     }
 
     /// Whether an edge lies on the ground.

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::clean::Notes;
-use crate::decks::{Clearances, Passage, Water, between, passages, straighten};
+use crate::decks::{Clearances, Passage, Water, bend, between, passages};
 use crate::exact::Segment;
 use crate::pieces::strip_width;
 use crate::sweep::{Swept, highest};
@@ -81,8 +81,11 @@ pub(crate) fn clear(
         }
         let mut needed: Vec<i32> = vec![i32::MIN / 2; network.nodes.len()];
         for lack in &lacks {
-            let nodes = &decks[lack.passage as usize].nodes;
-            for &end in [nodes[0], nodes[nodes.len() - 1]].iter() {
+            let passage = &decks[lack.passage as usize];
+            // A long deck rises where that is missing, a short one as a whole.
+            let ends = [passage.nodes[0], passage.nodes[passage.nodes.len() - 1]];
+            let bearing = if passage.is_long(network) { network.ends(lack.edge) } else { ends };
+            for end in bearing {
                 let raised = (swept.heights[end as usize] + lack.lack).min(swept.most[end as usize]);
                 needed[end as usize] = needed[end as usize].max(raised);
             }
@@ -91,7 +94,7 @@ pub(crate) fn clear(
         for (height, least) in swept.heights.iter_mut().zip(least) {
             *height = (*height).max(least);
         }
-        straighten(network, &swept.costs, &mut swept.heights);
+        bend(network, &swept.costs, &mut swept.heights);
     }
     // The ground may be cut away, or bored through.
     let belows = Belows { network, water: below.water };

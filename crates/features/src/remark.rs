@@ -38,7 +38,7 @@ pub enum Flaw {
     Doubled,
     /// Part of it is part of another.
     DoubledInPart,
-    /// An end that misses another way by less than a metre.
+    /// An end that misses another way by less than a metre, or ends on its carriageway.
     Gap,
     /// A line that crosses itself.
     SelfCrossing,
@@ -186,7 +186,7 @@ impl Flaw {
             Flaw::ZeroArea => "a ring has no area",
             Flaw::Doubled => "it is a copy of another",
             Flaw::DoubledInPart => "part of it is a copy of another",
-            Flaw::Gap => "an end misses another way by less than a metre",
+            Flaw::Gap => "an end misses another way and lies on it, or less than a metre off",
             Flaw::SelfCrossing => "it crosses itself",
             Flaw::CrossingUnjoined => "it crosses another way without a shared vertex",
             Flaw::BowTie => "a ring crosses itself",
