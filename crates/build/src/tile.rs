@@ -94,8 +94,11 @@ pub fn rebuild_tile(
     let mut ready = prepare(&findings, &shares, &frozen, progress)?;
     ready.report.outdated = is_outdated;
     let stale = stale(&run, &shares, &tins, &reached)?;
-    if 0 < stale {
-        let warning = format!("{stale} other tiles were made from other ground or borders; a build renews them");
+    let warning = match stale {
+        0 => "what tiles share was decided before sources or program changed; a build decides it again".to_owned(),
+        _ => format!("{stale} other tiles were made from other ground or borders; a build renews them"),
+    };
+    if 0 < stale || is_outdated {
         ready.report.warnings.push(warning);
     }
     drop((shares, tins, assembled, sums, enforced));

@@ -9,7 +9,7 @@ use build::product::{Opened, Product, ProductError};
 use fidelity::each_residual;
 use schedule::Workers;
 use serde::Serialize;
-use terrain::{Dem, Importance, LoadModule, ModuleId, QUANTA_PER_METRE, TileId};
+use terrain::{Decks, Dem, Importance, LoadModule, ModuleGrid, ModuleId, Objects, QUANTA_PER_METRE, TileId};
 
 /// What differs between two databases.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -27,7 +27,7 @@ pub struct Difference {
 }
 
 /// A load module before and after.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModuleDifference {
     /// Which.
     #[serde(serialize_with = "crate::row_col")]
@@ -43,8 +43,12 @@ pub struct ModuleDifference {
     pub largest_m: [f64; 2],
     /// Middle lines of ways of each.
     pub lines: [usize; 2],
-    /// How far the two surfaces lie apart at most, at posts, in metres; 0 where only triangles, classes, decks
-    /// or lines differ.
+    /// Buildings, walls and woods of each.
+    pub objects: [usize; 2],
+    /// What is not alike: `ground`, `decks`, `lines`, `objects`, `level 1` and on, for whatever of a coarser level.
+    pub differs: Vec<String>,
+    /// How far the two surfaces of the finest level lie apart at most, at posts, in metres; 0 where only triangles,
+    /// classes, or what is not ground differ.
     pub apart_m: f64,
 }
 
@@ -68,9 +72,13 @@ pub fn difference(first: &Path, second: &Path, workers: usize) -> Result<Differe
     // A tile of the first at a time: both are never held whole.
     let of_tile = |_: usize, tile: &TileId| -> Result<Vec<ModuleDifference>, ProductError> {
         let part = area.tiling.modules(*tile, area.grid);
-        let (of_first, of_second) = (Product::modules_in(&first_is, part)?, Product::modules_in(&second_is, part)?);
-        let pairs = of_first.iter().zip(&of_second).filter(|(a, b)| a != b);
-        Ok(pairs.map(|(a, b)| module_difference(area, a, b)).collect())
+        let both = [Product::levels_in(&first_is, part)?, Product::levels_in(&second_is, part)?];
+        let compared = |at: usize| {
+            let [a, b] = both.each_ref().map(|levels| levels.iter().map(|level| &level[at]).collect::<Vec<_>>());
+            let differs = differing(&a, &b);
+            (!differs.is_empty()).then(|| module_difference(area, (a[0], b[0]), differs))
+        };
+        Ok((0..part.count()).filter_map(compared).collect())
     };
     let changed = schedule::for_each_independent(&area.tiles, &Workers::new(workers), &AtomicBool::new(false), of_tile)
         .map_err(|error| GroundError::from_schedule(&area.tiles, error))?;
@@ -102,7 +110,30 @@ fn check_same_ground(first: &Opened, second: &Opened, path: &Path) -> Result<(),
     .into())
 }
 
-fn module_difference(area: &GamingArea, a: &LoadModule, b: &LoadModule) -> ModuleDifference {
+/// What is not alike of two load modules, each at its levels.
+fn differing(a: &[&LoadModule], b: &[&LoadModule]) -> Vec<String> {
+    let (finest, other) = (a[0], b[0]);
+    let parts = [
+        ("decks", finest.decks != other.decks),
+        ("lines", finest.lines != other.lines),
+        ("objects", finest.objects != other.objects),
+    ];
+    let mut all: Vec<String> = parts.iter().filter(|(_, differs)| *differs).map(|(name, _)| (*name).into()).collect();
+    let ground = |module: &LoadModule| LoadModule {
+        decks: Decks::default(),
+        lines: Vec::new(),
+        objects: Objects::default(),
+        ..module.clone()
+    };
+    if finest != other && ground(finest) != ground(other) {
+        all.insert(0, "ground".into());
+    }
+    let levels = 1..a.len().max(b.len());
+    all.extend(levels.filter(|level| a.get(*level) != b.get(*level)).map(|level| format!("level {level}")));
+    all
+}
+
+fn module_difference(area: &GamingArea, (a, b): (&LoadModule, &LoadModule), differs: Vec<String>) -> ModuleDifference {
     let rms = |module: &LoadModule| rms_m(module.residual.sum_squared, u64::from(module.residual.posts));
     let largest = |module: &LoadModule| f64::from(module.residual.largest) / f64::from(QUANTA_PER_METRE);
     ModuleDifference {
@@ -112,6 +143,8 @@ fn module_difference(area: &GamingArea, a: &LoadModule, b: &LoadModule) -> Modul
         rms_m: [rms(a), rms(b)],
         largest_m: [largest(a), largest(b)],
         lines: [a, b].map(|module| module.lines.len()),
+        objects: [a, b].map(|module| module.objects.prisms.len() + module.objects.canopies.len()),
+        differs,
         apart_m: f64::from(apart(area, a, b)) / f64::from(QUANTA_PER_METRE),
     }
 }
@@ -122,7 +155,9 @@ fn apart(area: &GamingArea, a: &LoadModule, b: &LoadModule) -> u32 {
     let rect = area.grid.posts_of(a.id);
     let flat = Dem::from_fn(rect, |_| Some(0));
     let mask = Importance::uniform(rect, terrain::THOUSANDTHS);
-    let ground = fidelity::Reference { dem: &flat, mask: &mask, grid: area.grid, spacing: area.frame.spacing };
+    // As the last of its row and column, a load module owns the posts of all of its sides.
+    let grid = ModuleGrid { rows: a.id.row + 1, cols: a.id.col + 1, ..area.grid };
+    let ground = fidelity::Reference { dem: &flat, mask: &mask, grid, spacing: area.frame.spacing };
     let wide = rect.posts_wide();
     let mut heights = vec![0; rect.post_count()];
     let place = |post: terrain::Post| (post.row - rect.south) as usize * wide + (post.col - rect.west) as usize;

@@ -15,7 +15,7 @@ use crate::terminal::{self, NotPrinted};
 
 /// What it means that a database is outdated.
 pub const OUTDATED: &str =
-    "some tiles were made again from changed sources, and others were not; `tiefort build` makes these, too";
+    "a tile was made again from changed sources, and not all that depends on them was; `tiefort build` does the rest";
 
 /// How a command ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

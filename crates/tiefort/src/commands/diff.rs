@@ -18,8 +18,8 @@ Examples:
   tiefort diff before.tdb after.tdb
   tiefort diff before.tdb after.tdb --format json | jq '.changed[].module'
 
-\"apart\" is how far the two surfaces lie apart at most, at posts of the working
-grid. Exit codes: 0 all load modules alike; 1 some differ; 2 nothing to compare.";
+\"apart\" is how far the two surfaces of the finest level lie apart at most, at
+posts of the working grid. Exit codes: 0 all load modules alike; 1 some differ; 2 nothing to compare.";
 
 /// Arguments of `diff`.
 #[derive(Args)]
@@ -79,8 +79,9 @@ fn text(found: &Difference, figures: &Figures, rows: usize) -> String {
 fn list(found: &Difference, rows: usize) -> String {
     let mut order: Vec<&ModuleDifference> = found.changed.iter().collect();
     order.sort_by(|a, b| b.apart_m.total_cmp(&a.apart_m).then(a.module.cmp(&b.module)));
-    let mut table = Table::new(&[Align::Left, Align::Right, Align::Right, Align::Right, Align::Right, Align::Right]);
-    table.row(["load module", "apart", "triangles A", "B", "RMS A", "B"]);
+    let columns = [Align::Left, Align::Right, Align::Right, Align::Right, Align::Right, Align::Right, Align::Left];
+    let mut table = Table::new(&columns);
+    table.row(["load module", "apart", "triangles A", "B", "RMS A", "B", "differs in"]);
     for module in order.iter().take(rows) {
         table.row([
             module.module.to_string(),
@@ -89,6 +90,7 @@ fn list(found: &Difference, rows: usize) -> String {
             module.triangles[1].to_string(),
             format!("{:.3} m", module.rms_m[0]),
             format!("{:.3} m", module.rms_m[1]),
+            module.differs.join(", "),
         ]);
     }
     let more = order.len().saturating_sub(rows);
@@ -175,6 +177,20 @@ fn figures(before: &Report, after: &Report) -> Vec<Figure> {
         metres("99 % within m", |report| report.residual.p99_m),
         metres("largest residual m", |report| report.residual.max_m),
     ];
+    for level in &before.levels {
+        let Some(other) = after.levels.iter().find(|other| other.level == level.level) else { continue };
+        let figure = |what: &str, [before, after]: [f64; 2], digits| {
+            let name = format!("{what} at level {}", level.level);
+            Figure { name, before, after, digits }
+        };
+        all.push(figure("triangles", [level.triangles, other.triangles].map(|count| count as f64), 0));
+        all.push(figure("RMS m", [level.rms_m, other.rms_m], 3));
+    }
+    for kind in before.objects.iter().flat_map(|objects| &objects.kinds) {
+        let others = after.objects.iter().flat_map(|objects| &objects.kinds);
+        let after = others.filter(|other| other.kind == kind.kind).map(|other| other.kept).sum::<u64>() as f64;
+        all.push(Figure { name: format!("kept of {}", kind.kind), before: kind.kept as f64, after, digits: 0 });
+    }
     for class in &before.classes {
         let Some(other) = after.classes.iter().find(|other| other.name == class.name) else { continue };
         let (before, after) = (class.residual.rms_m, other.residual.rms_m);
