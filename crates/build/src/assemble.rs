@@ -7,8 +7,8 @@ use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use store::engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use store::{FileStamp, Measured, MeasuredModule, TileModules};
 use terrain::{
-    Decks, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, ModuleLine, ModuleResidual, Post, PostRect,
-    TileId, Tin, Vertex, in_turn,
+    Decks, Dem, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, ModuleLine, ModuleResidual, Post,
+    PostRect, TileId, Tin, Vertex, in_turn,
 };
 use tin::load_modules::{
     ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, put_decks, stand,
@@ -147,7 +147,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
         modules.iter_mut().zip(lines).for_each(|(module, lines)| module.lines = lines);
     }
     let residuals = fidelity::measure(&mut modules, &window.measured(area));
-    let at_source = at_source(run, tile, &modules)?;
+    let at_source = at_source(run, tile, &modules, &natural.dem)?;
     let mut figures = feature_figures(run, tile, (&own.tin, &modules), &window)?;
     // Coarser levels are made of vertices of the TIN: those that lowered the ground onto decks are none.
     swap_grounds(&mut modules, &mut bare);
@@ -213,15 +213,22 @@ fn lift(modules: &mut [LoadModule], decks: &[((Decks, usize), Vec<ModuleLine>)])
 
 /// Residuals against the sources alone: at the posts of the working grid, where features or water are burned into it,
 /// and at the source's own posts, where those are others.
-fn at_source(run: &Run, tile: TileId, modules: &[LoadModule]) -> Result<[Option<Tally>; 2], CompileError> {
+fn at_source(
+    run: &Run,
+    tile: TileId,
+    modules: &[LoadModule],
+    natural: &Dem,
+) -> Result<[Option<Tally>; 2], CompileError> {
     let (area, relief) = (&run.area, &run.ground.relief);
     let rect = area.tiling.rect(tile);
     let own_posts = relief.residuals_at_source(modules, area, rect)?;
     if !run.burns_in() {
         return Ok([None, own_posts]);
     }
-    let (dem, mask) = (relief.dry(rect)?, Importance::uniform(rect, 0));
-    let source = fidelity::Reference { dem: &dem, mask: &mask, grid: area.grid, spacing: area.frame.spacing };
+    // Natural ground has level water, where a job says so.
+    let dry = relief.water.is_some().then(|| relief.dry(rect)).transpose()?;
+    let (dem, mask) = (dry.as_ref().unwrap_or(natural), Importance::uniform(rect, 0));
+    let source = fidelity::Reference { dem, mask: &mask, grid: area.grid, spacing: area.frame.spacing };
     let mut at_grid = Tally::default();
     modules.iter().for_each(|module| at_grid.merge(&fidelity::residuals(module, &source).total()));
     Ok([Some(at_grid), own_posts])
@@ -282,7 +289,7 @@ pub(crate) fn read_assembled(
     let file = folder.stamp_file(&folder.modules_path(tile))?;
     let (modules, coarser) = numbers_of(&levels);
     let residuals = fidelity::measure(&mut levels[0], &window.measured(area));
-    let at_source = at_source(run, tile, &levels[0])?;
+    let at_source = at_source(run, tile, &levels[0], &run.ground.natural_tile(area, tile)?.dem)?;
     let own = run.tin(tile, &tins[area.tiling.index(tile)].stamp)?;
     let counted = count_points(run, &own.tin, &[], &window.importance);
     let features = feature_figures(run, tile, (&own.tin, &levels[0]), &window)?;

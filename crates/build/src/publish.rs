@@ -13,6 +13,7 @@ use terrain::{LatticePoint, TileId};
 
 use crate::assemble::crs;
 use crate::forecast::{PAGE_MODULES_MAX, PAGE_POSTS_MAX};
+use crate::ground::Ground;
 use crate::level::stamp_of_buildings;
 use crate::outlines::objects_report;
 use crate::refine::Published;
@@ -110,8 +111,9 @@ pub(crate) fn prepare(
 pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Result<(Report, Database), CompileError> {
     let Ready { mut report, manifest, told } = ready;
     let work = run.database.folder().work(&run_name(&manifest.job, &run.records, ALGORITHM_REVISION));
-    // The page opens the ground by itself: there is no room for it twice.
-    drop((run.ground, run.tins));
+    drop(run.tins);
+    let mut ground = run.ground;
+    ground.forget_natural();
     let (job, database, outlines) = (run.job, run.database, run.outlines);
     let level = run.level.map(|settled| settled.level);
 
@@ -138,7 +140,7 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
     if run.page {
         progress.tell(Event::Enter(Stage::Page, 0));
         let opened = Opened::of(database.folder().clone(), manifest.clone())?;
-        write(files::REPORT_HTML, draw(&opened, job, &report, run.workers.count())?.as_bytes())?;
+        write(files::REPORT_HTML, draw(&opened, &ground, &report, run.workers.count())?.as_bytes())?;
         progress.tell(Event::Leave(Stage::Page));
     }
     report.files = beside;
@@ -154,14 +156,14 @@ pub(crate) fn publish(run: Run, ready: Ready, progress: &mut Stopwatch) -> Resul
 /// The page: with the ground as long as the area has no more than [`PAGE_POSTS_MAX`] posts (16 bytes each while it is
 /// drawn), with maps as long as it has no more than [`PAGE_MODULES_MAX`] load modules (a kilobyte each). Later one can
 /// ask for them.
-fn draw(opened: &Opened, job: &Job, report: &Report, workers: usize) -> Result<String, CompileError> {
+fn draw(opened: &Opened, ground: &Ground, report: &Report, workers: usize) -> Result<String, CompileError> {
     let grid = opened.area.grid;
     if PAGE_MODULES_MAX < grid.count() {
         return Ok(crate::product::page_without_maps(opened, report));
     }
     let read = |ground| Product::of(opened, &Wanted { part: None, ground, workers });
     let is_small = grid.area().post_count() <= PAGE_POSTS_MAX;
-    let ground = if is_small { WantedGround::Job(job) } else { WantedGround::None };
+    let ground = if is_small { WantedGround::Open(ground) } else { WantedGround::None };
     // A source may have gone meanwhile, and nothing else needs it any more.
     let product = read(ground).or_else(|_| read(WantedGround::None))?;
     Ok(crate::product::page(&product, report, workers))

@@ -246,6 +246,13 @@ impl Ground {
         kept_or(slot, || self.with_given(area, tile, self.natural(area.tiling.rect(tile))?))
     }
 
+    /// Keeps windows without features no longer where there are such with them.
+    pub fn forget_natural(&mut self) {
+        if self.lines.get().is_some() {
+            self.kept = None;
+        }
+    }
+
     /// The ground of a tile and of `halo` posts around it, put together from the windows of its neighbours, which
     /// are kept where memory allows.
     ///

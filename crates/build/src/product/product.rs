@@ -2,6 +2,7 @@
 //! how far one lies from the other at every post.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::ground::{GamingArea, Ground, GroundError, PlannedTile, Window, planned_tiles};
@@ -15,7 +16,7 @@ use views::NO_RESIDUAL;
 use crate::product::{Opened, ProductError, choose_ground, read_told};
 
 /// What is wanted of a database.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Wanted<'a> {
     /// The load modules to read; all without one.
     pub part: Option<ModuleRect>,
@@ -26,7 +27,7 @@ pub struct Wanted<'a> {
 }
 
 /// Where the ground under load modules comes from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub enum WantedGround<'a> {
     /// It is not wanted.
     None,
@@ -34,8 +35,8 @@ pub enum WantedGround<'a> {
     Recorded,
     /// Rasters, joined as the job joins its own.
     Rasters(&'a [PathBuf]),
-    /// What this job names: the one that was just built.
-    Job(&'a Job),
+    /// It is open: that of the build that has just made the database.
+    Open(&'a Ground),
 }
 
 /// A finished database, or a part of it.
@@ -108,13 +109,11 @@ impl Product {
         let part = wanted.part.unwrap_or(area.grid.all());
         check_part(part, area)?;
         let (workers, stop) = (Workers::new(wanted.workers), AtomicBool::new(false));
-        let ground = match open_ground(opened, wanted.ground)? {
-            Some((job, name)) => Some((Ground::open_built(&job, area, (&workers, &stop), folder)?, name)),
-            None => None,
-        };
+        let own = open_ground(opened, wanted.ground, (&workers, &stop))?;
+        let ground = wanted.ground.held(&own, opened);
         let meets = |tile: &TileId| area.tiling.modules(*tile, area.grid).intersection(part).is_some();
         let tiles: Vec<TileId> = area.tiles.iter().copied().filter(meets).collect();
-        let read = |_: usize, &tile: &TileId| read_tile(opened, ground.as_ref().map(|(ground, _)| ground), part, tile);
+        let read = |_: usize, &tile: &TileId| read_tile(opened, ground.map(|(ground, _)| ground), part, tile);
         let pieces = schedule::for_each_independent(&tiles, &workers, &stop, read)
             .map_err(|error| GroundError::from_schedule(&tiles, error))?;
         let (modules, pieces): (Vec<_>, Vec<_>) = pieces.into_iter().map(|piece| (piece.modules, piece.ground)).unzip();
@@ -124,7 +123,7 @@ impl Product {
         let rect = area.grid.posts_of_rect(part);
         let ground = ground.map(|(_, name)| {
             let pieces: Vec<Piece> = pieces.into_iter().flatten().collect();
-            join(&pieces, rect, name)
+            join(&pieces, rect, name.to_owned())
         });
         let (manifest, job) = (manifest.clone(), job.clone());
         let (grid, frame, tiles) = (area.grid, area.frame, planned_tiles(area));
@@ -132,21 +131,32 @@ impl Product {
         Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground, features })
     }
 
-    /// The load modules of a part, row by row from the south-west, and nothing else of the database.
+    /// The load modules of a part at the finest level, row by row from the south-west, and nothing else of the database.
     ///
     /// # Errors
     /// When one is missing or damaged.
     pub fn modules_in(opened: &Opened, part: ModuleRect) -> Result<Vec<LoadModule>, ProductError> {
+        Ok(Self::levels_in(opened, part)?.swap_remove(0))
+    }
+
+    /// The same at every level, the finest first.
+    ///
+    /// # Errors
+    /// As [`Product::modules_in`].
+    pub fn levels_in(opened: &Opened, part: ModuleRect) -> Result<Vec<Vec<LoadModule>>, ProductError> {
         let Opened { folder, manifest, area, .. } = opened;
         let [low, high] = [part.south_west(), ModuleId { row: part.north - 1, col: part.east - 1 }]
             .map(|corner| area.tiling.tile_of_module(corner, area.grid));
-        let mut modules = Vec::with_capacity(part.count());
+        let mut levels = vec![Vec::new(); opened.job.lod.inner_shares.len() + 1];
         for (row, col) in (low.row..=high.row).flat_map(|row| (low.col..=high.col).map(move |col| (row, col))) {
-            modules.append(&mut folder.read_part(manifest, TileId { row, col }, part)?.1[0]);
+            let read = folder.read_part(manifest, TileId { row, col }, part)?.1;
+            levels.iter_mut().zip(read).for_each(|(level, mut modules)| level.append(&mut modules));
         }
-        modules.sort_by_key(|module| module.id);
-        check_complete(&modules, part, folder)?;
-        Ok(modules)
+        for level in &mut levels {
+            level.sort_by_key(|module| module.id);
+            check_complete(level, part, folder)?;
+        }
+        Ok(levels)
     }
 
     /// What `each` makes of the load modules of each of these parts, and of the ground under them where it is wanted:
@@ -161,17 +171,15 @@ impl Product {
         workers: usize,
         each: impl Fn(&[LoadModule], Option<&Window>) -> R + Sync,
     ) -> Result<Vec<R>, ProductError> {
-        let Opened { folder, area, .. } = opened;
+        let area = &opened.area;
         let (workers, stop) = (Workers::new(workers), AtomicBool::new(false));
-        let ground = match open_ground(opened, wanted)? {
-            Some((job, _)) => Some(Ground::open_built(&job, area, (&workers, &stop), folder)?),
-            None => None,
-        };
+        let own = open_ground(opened, wanted, (&workers, &stop))?;
+        let ground = wanted.held(&own, opened).map(|(ground, _)| ground);
         let tiles: Vec<TileId> =
             parts.iter().map(|part| area.tiling.tile_of_module(part.south_west(), area.grid)).collect();
         let read = |_: usize, part: &ModuleRect| -> Result<R, ProductError> {
             let modules = Self::modules_in(opened, *part)?;
-            let window = ground.as_ref().map(|ground| ground.window(area.grid.posts_of_rect(*part))).transpose()?;
+            let window = ground.map(|ground| ground.window(area.grid.posts_of_rect(*part))).transpose()?;
             Ok(each(&modules, window.as_ref()))
         };
         schedule::for_each_independent(parts, &workers, &stop, read)
@@ -191,22 +199,33 @@ impl Product {
     }
 }
 
-/// The job that names the ground, and what the ground is called.
-fn open_ground(opened: &Opened, wanted: WantedGround) -> Result<Option<(Job, String)>, ProductError> {
-    let Opened { folder, manifest, job, .. } = opened;
-    let mut job = match wanted {
-        WantedGround::None => return Ok(None),
-        WantedGround::Job(job) => job.clone(),
-        WantedGround::Recorded | WantedGround::Rasters(_) => job.clone(),
+impl<'a> WantedGround<'a> {
+    /// The ground, and what it is called; `own` is what was opened for it.
+    fn held(self, own: &'a Option<(Ground, String)>, opened: &'a Opened) -> Option<(&'a Ground, &'a str)> {
+        match self {
+            WantedGround::Open(ground) => Some((ground, &opened.job.area.name)),
+            _ => own.as_ref().map(|(ground, name)| (ground, name.as_str())),
+        }
+    }
+}
+
+/// The ground where it is wanted and not open yet, and what it is called.
+fn open_ground(
+    opened: &Opened,
+    wanted: WantedGround,
+    (workers, stop): (&Workers, &AtomicBool),
+) -> Result<Option<(Ground, String)>, ProductError> {
+    let Opened { folder, manifest, job, area } = opened;
+    let paths = match wanted {
+        WantedGround::None | WantedGround::Open(_) => return Ok(None),
+        WantedGround::Recorded => &[],
+        WantedGround::Rasters(paths) => paths,
     };
+    let mut job = job.clone();
     // No weight changes a height.
     job.importance.areas.clear();
-    let name = match wanted {
-        WantedGround::Job(job) => job.area.name.clone(),
-        WantedGround::Rasters(paths) => choose_ground(&mut job, manifest, folder.dir(), paths)?,
-        _ => choose_ground(&mut job, manifest, folder.dir(), &[])?,
-    };
-    Ok(Some((job, name)))
+    let name = choose_ground(&mut job, manifest, folder.dir(), paths)?;
+    Ok(Some((Ground::open_built(&job, area, (workers, stop), folder)?, name)))
 }
 
 fn check_part(part: ModuleRect, area: &GamingArea) -> Result<(), ProductError> {
@@ -256,15 +275,20 @@ fn read_tile(
     let modules = folder.read_part(manifest, tile, part)?.1.swap_remove(0);
     let ground = match ground {
         Some(ground) => {
-            let window = ground.window(area.grid.posts_of_rect(inside))?;
-            Some(measured(&modules, window, area, part))
+            let rect = area.grid.posts_of_rect(inside);
+            // A whole tile may be known from its stages.
+            let window = match rect == area.tiling.rect(tile) {
+                true => ground.tile(area, tile)?,
+                false => Arc::new(ground.window(rect)?),
+            };
+            Some(measured(&modules, &window, area, part))
         }
         None => None,
     };
     Ok(TilePiece { modules, ground })
 }
 
-fn measured(modules: &[LoadModule], window: Window, area: &GamingArea, part: ModuleRect) -> Piece {
+fn measured(modules: &[LoadModule], window: &Window, area: &GamingArea, part: ModuleRect) -> Piece {
     let rect = window.dem.rect();
     let mut residuals = vec![NO_RESIDUAL; rect.post_count()];
     // Posts on the northern and eastern side of the part have no owner in it, unless they lie on the area's border.
@@ -273,7 +297,7 @@ fn measured(modules: &[LoadModule], window: Window, area: &GamingArea, part: Mod
     for module in modules {
         each_residual(module, &measured, |post, residual| residuals[place(rect, post)] = residual);
     }
-    Piece { dem: window.dem, residuals }
+    Piece { dem: window.dem.clone(), residuals }
 }
 
 fn place(rect: PostRect, post: Post) -> usize {
