@@ -33,35 +33,27 @@ pub enum Stage {
 impl Stage {
     /// As in reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Stage::Read => "read",
-            Stage::Profile => "profile",
-            Stage::Level => "level",
-            Stage::Outlines => "outlines",
-            Stage::Survey => "survey",
-            Stage::Allocate => "allocate",
-            Stage::Refine => "refine",
-            Stage::Assemble => "assemble",
-            Stage::Enforce => "enforce",
-            Stage::Publish => "publish",
-            Stage::Page => "page",
-        }
+        self.words()[0]
     }
 
     /// What it makes, in a few words.
     pub fn meaning(self) -> &'static str {
+        self.words()[1]
+    }
+
+    fn words(self) -> [&'static str; 2] {
         match self {
-            Stage::Read => "Heights and weights, ready to be asked",
-            Stage::Profile => "The ground along roads and water, tile by tile",
-            Stage::Level => "How high roads and water lie",
-            Stage::Outlines => "Buildings, walls and woods that have room",
-            Stage::Survey => "What more points would gain, tile by tile",
-            Stage::Allocate => "What each tile may spend",
-            Stage::Refine => "The TINs of tiles",
-            Stage::Assemble => "The load modules of tiles",
-            Stage::Enforce => "Room where a limit is exceeded",
-            Stage::Publish => "All that is left, and the report",
-            Stage::Page => "The report's page",
+            Stage::Read => ["read", "Heights and weights, ready to be asked"],
+            Stage::Profile => ["profile", "The ground along roads and water, tile by tile"],
+            Stage::Level => ["level", "How high roads and water lie"],
+            Stage::Outlines => ["outlines", "Buildings, walls and woods that have room"],
+            Stage::Survey => ["survey", "What more points would gain, tile by tile"],
+            Stage::Allocate => ["allocate", "What each tile may spend"],
+            Stage::Refine => ["refine", "The TINs of tiles"],
+            Stage::Assemble => ["assemble", "The load modules of tiles"],
+            Stage::Enforce => ["enforce", "Room where a limit is exceeded"],
+            Stage::Publish => ["publish", "All that is left, and the report"],
+            Stage::Page => ["page", "The report's page"],
         }
     }
 }

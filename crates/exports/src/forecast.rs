@@ -108,7 +108,6 @@ mod tests {
                 assert_eq!(found, Forecast { triangles: levels as u64, bytes, texture_bytes: 0 });
             }
         }
-        let raster = CARRIES.iter().find(|format| format.format == "geotiff").unwrap();
-        assert_eq!(Forecast::of(&with_objects(), raster).unwrap(), None);
+        assert_eq!(Forecast::of(&with_objects(), crate::Format::Geotiff.carries()).unwrap(), None);
     }
 }

@@ -1,10 +1,65 @@
-//! What each format carries of what a database has: the one table for the help, the guide and the end of an export.
+//! The formats of exports and what each carries of what a database has: the one table for the arguments, the help, the
+//! guide and the end of an export.
+
+/// A format of exports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// `modules`.
+    Modules,
+    /// `ply`.
+    Ply,
+    /// `obj`.
+    Obj,
+    /// `glb`.
+    Glb,
+    /// `geotiff`.
+    Geotiff,
+    /// `gpkg`.
+    Gpkg,
+    /// `features`.
+    Features,
+    /// `openflight`.
+    Openflight,
+    /// `3dtiles`.
+    Tiles3d,
+    /// `quantized-mesh`.
+    QuantizedMesh,
+    /// `3dtiles-terrain`.
+    Tiles3dTerrain,
+    /// `3tz`.
+    Archive,
+    /// `mbtiles`.
+    Mbtiles,
+    /// `terrain-rgb`.
+    TerrainRgb,
+    /// `usd`.
+    Usd,
+    /// `heightmap`.
+    Heightmap,
+    /// `gazebo`.
+    Gazebo,
+}
+
+impl Format {
+    /// Its row of the table.
+    pub fn carries(self) -> &'static Carries {
+        CARRIES.iter().find(|row| row.format == self).expect("each format has a row")
+    }
+}
 
 /// What a format has of what a database has.
 #[derive(Clone, Copy, Debug)]
 pub struct Carries {
-    /// The format's name.
-    pub format: &'static str,
+    /// The format.
+    pub format: Format,
+    /// What it is called on the command line.
+    pub name: &'static str,
+    /// What it is, in a line.
+    pub meaning: &'static str,
+    /// The extensions of which its one file must have one; none where it is a folder.
+    pub extensions: &'static [&'static str],
+    /// Whether its heights are above the ellipsoid of WGS 84.
+    pub is_for_globes: bool,
     /// What classes of ground become.
     pub classes: &'static str,
     /// What decks of bridges become.
@@ -28,7 +83,12 @@ pub struct Carries {
 impl Carries {
     /// Whether all of it has one texture, in or beside one file.
     pub(crate) fn is_one_file(&self) -> bool {
-        matches!(self.format, "obj" | "glb")
+        matches!(self.format, Format::Obj | Format::Glb)
+    }
+
+    /// Whether it has room for the ground alone, and decks are left out.
+    pub fn is_without_decks(&self) -> bool {
+        self.decks == GROUND_ALONE
     }
 
     /// Whether coarser levels have textures of their own.
@@ -44,7 +104,11 @@ const LAST_UVS: &str = "the last TEXCOORD";
 const GROUND_ALONE: &str = "left out: there is room for the ground alone";
 
 const MESH: Carries = Carries {
-    format: "",
+    format: Format::Modules,
+    name: "",
+    meaning: "",
+    extensions: &[],
+    is_for_globes: false,
     classes: "materials",
     decks: "meshes of their own",
     ribbons: "meshes of their own",
@@ -70,7 +134,9 @@ const CLOSED: &str = "kept, since tiles must be closed; holes.geojson says where
 /// The table, in the order of the formats.
 pub const CARRIES: [Carries; 17] = [
     Carries {
-        format: "modules",
+        format: Format::Modules,
+        name: "modules",
+        meaning: "A folder with one load-module file (docs/FORMAT.md) for each load module",
         classes: "a class for each triangle",
         decks: "in the files of their load modules",
         ribbons: "middle lines in the files of their load modules",
@@ -80,7 +146,10 @@ pub const CARRIES: [Carries; 17] = [
         ..MESH
     },
     Carries {
-        format: "ply",
+        format: Format::Ply,
+        name: "ply",
+        meaning: "A mesh as binary PLY",
+        extensions: &["ply"],
         classes: "faces class by class",
         decks: "faces behind those of the ground",
         ribbons: "faces behind those of decks",
@@ -89,7 +158,10 @@ pub const CARRIES: [Carries; 17] = [
         ..MESH
     },
     Carries {
-        format: "obj",
+        format: Format::Obj,
+        name: "obj",
+        meaning: "A mesh as Wavefront OBJ",
+        extensions: &["obj"],
         classes: "materials in NAME.mtl",
         objects: "an object each",
         textures: "a picture beside it",
@@ -97,7 +169,10 @@ pub const CARRIES: [Carries; 17] = [
         ..MESH
     },
     Carries {
-        format: "glb",
+        format: Format::Glb,
+        name: "glb",
+        meaning: "A mesh as binary glTF 2.0",
+        extensions: &["glb"],
         objects: "a node each, with id and height",
         textures: "a picture inside",
         levels: "nodes of MSFT_lod in place of those of load modules",
@@ -105,9 +180,19 @@ pub const CARRIES: [Carries; 17] = [
         triangle_bytes: 40.0,
         ..MESH
     },
-    Carries { format: "geotiff", holes: "NaN in the raster", ..RASTER },
     Carries {
-        format: "gpkg",
+        format: Format::Geotiff,
+        name: "geotiff",
+        meaning: "A Cloud Optimized GeoTIFF of the compiled surface, or of its residual",
+        extensions: &["tif"],
+        holes: "NaN in the raster",
+        ..RASTER
+    },
+    Carries {
+        format: Format::Gpkg,
+        name: "gpkg",
+        meaning: "A GeoPackage for QGIS: load modules, breaches, tiles, triangles, decks, with styles",
+        extensions: &["gpkg"],
         classes: "an attribute",
         decks: "in the layer decks",
         ribbons: "middle lines in the layer lines",
@@ -116,7 +201,10 @@ pub const CARRIES: [Carries; 17] = [
         ..MESH
     },
     Carries {
-        format: "features",
+        format: Format::Features,
+        name: "features",
+        meaning: "A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, degraded or left out",
+        extensions: &["gpkg"],
         classes: "an attribute",
         decks: "in the layer decks",
         ribbons: "in the layer lines",
@@ -126,7 +214,9 @@ pub const CARRIES: [Carries; 17] = [
         ..MESH
     },
     Carries {
-        format: "openflight",
+        format: Format::Openflight,
+        name: "openflight",
+        meaning: "A folder of OpenFlight 16.1 files, one for each 4 km square, and a MetaFlight index",
         classes: "materials and surface material codes",
         objects: "an object each, their materials from code 256 on",
         textures: "a picture for each square",
@@ -135,19 +225,60 @@ pub const CARRIES: [Carries; 17] = [
         triangle_bytes: 163.0,
         ..MESH
     },
-    Carries { format: "3dtiles", ..TILES },
-    Carries { format: "quantized-mesh", classes: "water alone, as a mask", holes: CLOSED, ..RASTER },
-    Carries { format: "3dtiles-terrain", holes: CLOSED, ..RASTER },
-    Carries { format: "3tz", ..TILES },
     Carries {
-        format: "mbtiles",
+        format: Format::Tiles3d,
+        name: "3dtiles",
+        meaning: "A folder of 3D Tiles 1.1, for globes",
+        is_for_globes: true,
+        ..TILES
+    },
+    Carries {
+        format: Format::QuantizedMesh,
+        name: "quantized-mesh",
+        meaning: "A folder of quantized-mesh 1.0 terrain, for globes",
+        is_for_globes: true,
+        classes: "water alone, as a mask",
+        holes: CLOSED,
+        ..RASTER
+    },
+    Carries {
+        format: Format::Tiles3dTerrain,
+        name: "3dtiles-terrain",
+        meaning: "A folder of 3D Tiles 1.1 that CesiumJS 1.135 and later take for terrain",
+        is_for_globes: true,
+        holes: CLOSED,
+        ..RASTER
+    },
+    Carries {
+        format: Format::Archive,
+        name: "3tz",
+        meaning: "3D Tiles in one archive",
+        extensions: &["3tz"],
+        is_for_globes: true,
+        ..TILES
+    },
+    Carries {
+        format: Format::Mbtiles,
+        name: "mbtiles",
+        meaning: "Quantized-mesh terrain in one SQLite file",
+        extensions: &["mbtiles"],
+        is_for_globes: true,
         classes: "water alone, as a mask",
         holes: "kept, since tiles must be closed; the entry holes of metadata says where they are",
         ..RASTER
     },
-    Carries { format: "terrain-rgb", holes: "0 m high, as places outside of the area", ..RASTER },
     Carries {
-        format: "usd",
+        format: Format::TerrainRgb,
+        name: "terrain-rgb",
+        meaning: "Terrain for web maps, as MBTiles or PMTiles: heights as colours of PNG tiles in web mercator",
+        extensions: &["mbtiles", "pmtiles"],
+        holes: "0 m high, as places outside of the area",
+        ..RASTER
+    },
+    Carries {
+        format: Format::Usd,
+        name: "usd",
+        meaning: "A folder of OpenUSD text: a file for each tile, with collision meshes, for Isaac Sim, Omniverse and Blender",
         classes: "subsets with materials",
         objects: "a prim each, with id and height",
         textures: "a picture for each tile",
@@ -157,14 +288,18 @@ pub const CARRIES: [Carries; 17] = [
         ..MESH
     },
     Carries {
-        format: "heightmap",
+        format: Format::Heightmap,
+        name: "heightmap",
+        meaning: "A folder of 16-bit heightmaps for Unreal or Unity, with the numbers to type into the import dialog",
         classes: "maps of weights, one for each on the same samples",
         objects: "placements in objects.csv",
         holes: "as high as the triangles that close them; heightmap.json counts the samples",
         ..RASTER
     },
     Carries {
-        format: "gazebo",
+        format: Format::Gazebo,
+        name: "gazebo",
+        meaning: "A folder with a world for Gazebo: meshes of 2 km, loaded by distance",
         classes: "materials in classes.mtl",
         ribbons: "meshes that are seen and not hit",
         objects: "meshes that are seen, and boxes that are hit",
@@ -196,8 +331,8 @@ pub fn carries_text() -> String {
         let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
         for row in &CARRIES {
             match told.iter_mut().find(|(word, _)| *word == of(row)) {
-                Some((_, formats)) => formats.push(row.format),
-                None => told.push((of(row), vec![row.format])),
+                Some((_, formats)) => formats.push(row.name),
+                None => told.push((of(row), vec![row.name])),
             }
         }
         for (word, formats) in told {
@@ -230,7 +365,7 @@ mod tests {
         let head: String = COLUMNS.iter().map(|(name, _)| format!(" {name} |")).collect();
         let row = |row: &Carries| {
             let cells: String = COLUMNS.iter().map(|(_, of)| format!(" {} |", of(row))).collect();
-            format!("| {} |{cells}\n", row.format)
+            format!("| {} |{cells}\n", row.name)
         };
         let rows: String = CARRIES.iter().map(row).collect();
         format!("| |{head}\n|{} - |\n{rows}", " - |".repeat(COLUMNS.len()))

@@ -73,31 +73,43 @@ pub(crate) const FEATURES: &[Key] = &[
         .usual("true"),
 ];
 
-pub(crate) const FEATURE_SOURCES: &[Key] = &[
-    Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON or GeoParquet")
-        .form("the path of a file of lines and polygons")
-        .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+const fn layer(example: &'static str) -> Key {
     Key::new("layer", "its layer")
         .line("the name of a layer of a GeoPackage", LAYER_CHARS_MAX)
         .otherwise("its only one")
-        .example("{ file = \"hydro.gpkg\", layer = \"rivers\" }"),
-    Key::new("kind", "the kind of its features, whatever their tags say; rules come first")
-        .words::<Kind>()
-        .otherwise("as rules and tags say")
-        .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+        .example(example)
+}
+
+const fn crs(example: &'static str) -> Key {
     Key::new("crs", "the system of its coordinates, where it names none or a wrong one; not of OpenStreetMap data")
         .line("a coordinate system, as \"EPSG:4326\" or well-known text", WKT_CHARS_MAX)
         .otherwise(FILE_SAYS)
-        .example("{ file = \"roads.shp\", crs = \"EPSG:32611\" }"),
-];
+        .example(example)
+}
 
-pub(crate) const RULES: &[Key] = &[
-    Key::new("where", "tags or attribute columns, all of which a feature must have; empty for every feature")
+const fn tags(example: &'static str) -> Key {
+    Key::new("where", "tags or attribute columns, all of which it must have; empty for all")
         .bounded(|| {
             let values = "a value or a list of values each, [] for any";
             format!("a table of tags with {values}, keys and values of 1 to {TAG_CHARS_MAX} characters")
         })
-        .example("where = { highway = [\"track\", \"path\"], surface = \"sand\" }"),
+        .example(example)
+}
+
+pub(crate) const FEATURE_SOURCES: &[Key] = &[
+    Key::new("file", "the file: OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON or GeoParquet")
+        .form("the path of a file of lines and polygons")
+        .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+    layer("{ file = \"hydro.gpkg\", layer = \"rivers\" }"),
+    Key::new("kind", "the kind of its features, whatever their tags say; rules come first")
+        .words::<Kind>()
+        .otherwise("as rules and tags say")
+        .example("{ file = \"lakes.shp\", kind = \"lake\" }"),
+    crs("{ file = \"roads.shp\", crs = \"EPSG:32611\" }"),
+];
+
+pub(crate) const RULES: &[Key] = &[
+    tags("where = { highway = [\"track\", \"path\"], surface = \"sand\" }"),
     Key::new("kind", "what it is")
         .words::<RuleKind>()
         .otherwise("as the built-in table or the source says, else \"breakline\"")
@@ -163,10 +175,7 @@ pub(crate) const OBJECT_SOURCES: &[Key] = &[
     Key::new("file", "OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON, or a raster of heights of leaves")
         .form("the path of a file of polygons and lines, or of a raster")
         .example(SOURCE),
-    Key::new("layer", "its layer")
-        .line("the name of a layer of a GeoPackage", LAYER_CHARS_MAX)
-        .otherwise("its only one")
-        .example("{ file = \"town.gpkg\", layer = \"houses\" }"),
+    layer("{ file = \"town.gpkg\", layer = \"houses\" }"),
     Key::new("kind", "what its polygons and lines are, whatever their tags say; rules come first")
         .words::<ObjectKind>()
         .otherwise("as rules and tags say")
@@ -175,10 +184,7 @@ pub(crate) const OBJECT_SOURCES: &[Key] = &[
         .line("the name of an attribute", TAG_CHARS_MAX)
         .otherwise("height")
         .example(SOURCE),
-    Key::new("crs", "the system of its coordinates, where it names none or a wrong one; not of OpenStreetMap data")
-        .line("a coordinate system, as \"EPSG:4326\" or well-known text", WKT_CHARS_MAX)
-        .otherwise(FILE_SAYS)
-        .example("{ file = \"houses.shp\", crs = \"EPSG:32611\" }"),
+    crs("{ file = \"houses.shp\", crs = \"EPSG:32611\" }"),
     Key::new("least_m", "of a raster of heights of leaves: the height under which there is no wood")
         .number("metres", OBJECT_HEIGHT_M)
         .usual("3")
@@ -194,12 +200,7 @@ const CANOPY: &str = "{ file = \"canopy.tif\", least_m = 3, cell_m = 12.5 }";
 const SOURCE: &str = "{ file = \"houses.gpkg\", kind = \"building\", height = \"h_m\" }";
 
 pub(crate) const OBJECT_RULES: &[Key] = &[
-    Key::new("where", "tags or attribute columns, all of which an object must have; empty for every object")
-        .bounded(|| {
-            let values = "a value or a list of values each, [] for any";
-            format!("a table of tags with {values}, keys and values of 1 to {TAG_CHARS_MAX} characters")
-        })
-        .example("where = { building = [\"silo\"] }"),
+    tags("where = { building = [\"silo\"] }"),
     Key::new("kind", "what it is; \"none\" leaves it out")
         .bounded(|| {
             let words: Vec<String> = ObjectKind::WORDS.iter().map(|word| format!("\"{}\"", word.name)).collect();

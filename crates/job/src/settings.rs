@@ -8,17 +8,19 @@ use terrain::{MaterialName, THOUSANDTHS, metres_of_quanta};
 use crate::setting_list::{List, Setting, counted, number, quoted};
 use crate::{
     AreaShape, Budget, Choice, DemSource, Edges, GeoidSpec, ImportanceArea, Job, LodSpec, Method, Optimising,
-    Resampling, Sight, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features,
+    Resampling, Sight, SourceEntry, Start, TinSpec, Voids, WaterSpec, settings_features, usual_text,
 };
 
-/// What `load_modules.format` usually is.
-const MODULES_FORMAT_USUAL: u32 = 3;
-
 /// The lines of a [canonical text](Job::canonical_text) that decide what is built: all but the title, which only stands
-/// above the report's page, and what exports are told.
+/// above the report's page, and the section of what exports are told.
 pub fn deciding_lines(canonical: &str) -> impl Iterator<Item = &str> {
-    let told = ["title = ", "[exports]", "materials = "];
-    canonical.lines().filter(move |line| told.iter().all(|start| !line.starts_with(start)))
+    let mut is_of_exports = false;
+    canonical.lines().filter(move |line| {
+        if line.starts_with('[') {
+            is_of_exports = *line == "[exports]";
+        }
+        !is_of_exports && !line.starts_with("title = ")
+    })
 }
 
 impl Job {
@@ -190,7 +192,7 @@ impl Job {
             list.choice("load_modules.clip_heights", heights);
         }
         // Without features there is nothing that it could leave out.
-        if self.features.is_some() || modules.format != MODULES_FORMAT_USUAL {
+        if self.features.is_some() || modules.format.to_string() != usual_text("load_modules.format") {
             list.add("load_modules.format", modules.format.to_string());
         }
     }

@@ -8,22 +8,18 @@ use serde::Serialize;
 use terrain::{GainCurve, LoadModule, TileFeatures, TileTin};
 
 use crate::lock::LOCK_NAME;
-use crate::names::{MEASURED, MODULES, SURVEY, TILES, WORK, files};
+use crate::names::{FOLDERS, WORK, files};
+use crate::verify::KINDS;
 use crate::{
     Area, AreaLevel, AreaOutlines, Building, DatabaseError, FileStamp, Folder, Lock, Manifest, ManifestState, Measured,
     Profile, Removals, Report, TileModules, Work, encode_buildings, encode_curve, encode_level, encode_levels,
     encode_lines, encode_measured, encode_outlines, encode_profile, encode_removals, encode_tile, json,
 };
 
-/// The folders of a database that stay.
-const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// What is written beside a finished build.
 fn reports() -> impl Iterator<Item = &'static str> {
     [files::REPORT].into_iter().chain(files::BESIDE_REPORT)
 }
-/// Endings of the names that a build gives to files in those folders.
-const ENDINGS: [&str; 10] =
-    [".tin", ".removed", ".slm", ".sums", ".curve", ".profile", ".lines", ".level", ".buildings", ".outlines"];
 
 /// A database to write to: by this process alone, or by all that have joined it.
 #[derive(Debug)]
@@ -285,7 +281,7 @@ impl Database {
         self.remove(files::ALLOCATION)?;
         for name in FOLDERS {
             for path in self.folder.list(&self.folder.path(name))? {
-                let is_ours = ENDINGS.iter().any(|ending| path.to_string_lossy().ends_with(ending));
+                let is_ours = KINDS.iter().any(|(ending, _)| path.to_string_lossy().ends_with(ending));
                 if is_ours && matches!(self.folder.store().entry(&path), Ok(Entry::File(_))) {
                     self.remove_if_there(&path)?;
                 }

@@ -9,7 +9,7 @@ use load_module_reader::ReadError;
 use terrain::{LoadModuleFault, ModuleId, TinFault};
 use thiserror::Error as ThisError;
 
-use crate::names::{MODULES, SURVEY, TILES, WORK, files};
+use crate::names::{FOLDERS, WORK, files};
 
 /// Why a file of ours could not be written, or not be believed when read.
 #[derive(Debug, ThisError)]
@@ -235,7 +235,7 @@ impl NotADatabase {
     /// What `dir`, in which there is no `database.json`, is; `None` for the folder of a build that has not begun to
     /// publish.
     pub(crate) fn of(dir: &Path) -> Option<Self> {
-        let is_unfinished = || [TILES, MODULES, SURVEY, WORK].iter().any(|name| dir.join(name).is_dir());
+        let is_unfinished = || FOLDERS.iter().chain([&WORK]).any(|name| dir.join(name).is_dir());
         let is_job = || dir.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
         let is_inside = || dir.parent().is_some_and(|around| around.join(files::DATABASE).is_file());
         match std::fs::metadata(dir) {

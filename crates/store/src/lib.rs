@@ -79,7 +79,7 @@ pub use work::{RUN_DIGITS, TileBudget, Work};
 mod folder;
 pub use folder::Folder;
 mod names;
-pub use names::files;
+pub use names::{FOLDERS, files};
 mod database;
 mod read;
 pub use database::Database;

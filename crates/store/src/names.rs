@@ -38,5 +38,7 @@ pub(crate) const MODULES: &str = "modules";
 pub(crate) const MEASURED: &str = "measured";
 /// Folder of the survey.
 pub(crate) const SURVEY: &str = "survey";
+/// The folders of a database that stay.
+pub const FOLDERS: [&str; 4] = [TILES, MODULES, MEASURED, SURVEY];
 /// Folder of leases and marks, gone at the end of a build.
 pub(crate) const WORK: &str = "work";

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use crate::engine::is_temporary;
 use serde::Deserialize;
 
-use crate::names::{MEASURED, MODULES, SURVEY, TILES, files};
+use crate::names::{FOLDERS, files};
 use crate::page::check_page;
 use crate::read::{check_length, check_stamp};
 use crate::{
@@ -22,6 +22,26 @@ pub struct Damage {
     /// What is wrong with it, by section where that is known.
     pub error: DatabaseError,
 }
+
+/// Reads a file of one kind, as far as damage in it can be told.
+type Decode = fn(&Path, &[u8]) -> Result<(), DatabaseError>;
+
+/// Endings of the names that a build gives to files in its folders, and what reads such files.
+pub(crate) const KINDS: [(&str, Decode); 10] = [
+    (".tin", |path, bytes| {
+        let unsound = |fault| DatabaseError::UnsoundTin { path: path.to_path_buf(), fault };
+        tile_file::decode_tile(path, bytes)?.1.tin.check().map_err(unsound)
+    }),
+    (".slm", |path, bytes| slm::decode_modules(path, bytes).map(drop)),
+    (".sums", |path, bytes| measured_file::decode_measured(path, bytes).map(drop)),
+    (".curve", |path, bytes| beside_tile::decode_curve(path, bytes).map(drop)),
+    (".profile", |path, bytes| beside_tile::decode_profile(path, bytes).map(drop)),
+    (".lines", |path, bytes| beside_tile::decode_lines(path, bytes).map(drop)),
+    (".level", |path, bytes| level_file::decode_level(path, bytes).map(drop)),
+    (".outlines", |path, bytes| outlines_file::decode_outlines(path, bytes).map(drop)),
+    (".buildings", |path, bytes| buildings_file::decode_buildings(path, bytes).map(drop)),
+    (".removed", |path, bytes| beside_tile::decode_removals(path, bytes).map(drop)),
+];
 
 impl Folder {
     /// Every file that `manifest` lists, with how it must look.
@@ -60,7 +80,7 @@ impl Folder {
         // They know times, so the report lists them, and no manifest the report.
         damage.extend(self.damage_of_reports(Self::check_bytes));
         let known: BTreeSet<PathBuf> = listed.into_iter().map(|(path, _)| path).collect();
-        for name in [TILES, MODULES, MEASURED, SURVEY] {
+        for name in FOLDERS {
             for path in self.list(&self.path(name))? {
                 let temporary = path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy()));
                 if !known.contains(&path) && !temporary {
@@ -90,7 +110,7 @@ impl Folder {
     pub fn verify_bytes(&self, manifest: &Manifest) -> Result<bool, DatabaseError> {
         let listed = self.listed_files(manifest);
         let mut files = 0;
-        for name in [TILES, MODULES, MEASURED, SURVEY] {
+        for name in FOLDERS {
             files += self.list(&self.path(name))?.len();
         }
         let is_whole = |(path, stamp): &(PathBuf, FileStamp)| self.check_file(path, stamp).is_ok();
@@ -100,23 +120,8 @@ impl Folder {
     /// Decodes first, because that names the section; a file that decodes may still be another than the one listed.
     fn check_listed(&self, path: &Path, stamp: &FileStamp) -> Result<(), DatabaseError> {
         let bytes = self.read(path)?;
-        match path.extension().and_then(|extension| extension.to_str()) {
-            Some("tin") => {
-                let (_, tile) = tile_file::decode_tile(path, &bytes)?;
-                let unsound = |fault| DatabaseError::UnsoundTin { path: path.to_path_buf(), fault };
-                tile.tin.check().map_err(unsound)?;
-            }
-            Some("slm") => drop(slm::decode_modules(path, &bytes)?),
-            Some("sums") => drop(measured_file::decode_measured(path, &bytes)?),
-            Some("curve") => drop(beside_tile::decode_curve(path, &bytes)?),
-            Some("profile") => drop(beside_tile::decode_profile(path, &bytes)?),
-            Some("lines") => drop(beside_tile::decode_lines(path, &bytes)?),
-            Some("level") => drop(level_file::decode_level(path, &bytes)?),
-            Some("outlines") => drop(outlines_file::decode_outlines(path, &bytes)?),
-            Some("buildings") => drop(buildings_file::decode_buildings(path, &bytes)?),
-            Some("removed") => drop(beside_tile::decode_removals(path, &bytes)?),
-            _ => {}
-        }
+        let kind = KINDS.iter().find(|(ending, _)| path.to_string_lossy().ends_with(ending));
+        kind.map_or(Ok(()), |(_, decode)| decode(path, &bytes))?;
         check_stamp(path, &bytes, stamp, files::DATABASE)
     }
 

@@ -142,8 +142,7 @@ pub fn check_writable(path: &Path) -> Result<(), Failure> {
 
 /// Bytes of each part of a database that is there: its folders, then its other files together.
 pub fn sizes(database: &Path) -> Vec<(&'static str, u64)> {
-    let folders = ["modules", "tiles", "measured", "survey"];
-    let mut sizes: Vec<_> = folders.into_iter().map(|name| (name, bytes_in(&database.join(name)))).collect();
+    let mut sizes: Vec<_> = store::FOLDERS.into_iter().map(|name| (name, bytes_in(&database.join(name)))).collect();
     sizes.push(("reports and the rest", bytes_in(database)));
     sizes.retain(|&(_, bytes)| 0 < bytes);
     sizes

@@ -4,14 +4,14 @@ use std::collections::HashSet;
 
 use features::objects::{FoundObject, FoundShape, OBJECT_KEYS, traits};
 use job::{Job, ObjectsSpec};
-use source_files::{Crs, Done, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted, is_feature_file};
+use source_files::{Crs, FeatureFile, VectorFeature, VectorShape, Vertices, Wanted, is_feature_file};
 use store::FeatureRemark;
 use terrain::{Each, ObjectKind};
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
 use crate::ground::canopy;
-use crate::ground::vectors::bounds;
+use crate::ground::vectors::{bad_crs, bounds, remark_of};
 
 /// What the sources of objects hold that lies in the area or near it.
 #[derive(Debug, Default)]
@@ -33,7 +33,10 @@ impl FoundObjects {
         let mut found = Self::default();
         for source in &spec.sources {
             let name = source.file.written.as_str();
-            let crs = source.crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(name, &found)));
+            let crs = source
+                .crs
+                .as_deref()
+                .map(|text| Crs::named(text).map_err(|found| bad_crs("objects.sources", name, &found)));
             let crs = crs.transpose()?;
             if !is_feature_file(&source.file.path) {
                 let woods = canopy::woods(job, (spec, source), crs, area, each)?;
@@ -72,17 +75,7 @@ impl FoundObjects {
             // Of what is no object nothing is told: ways without places in a file of roads are no concern of these.
             let names: HashSet<&str> = found.objects[before..].iter().map(|object| object.name.as_str()).collect();
             let own = remarks.into_iter().filter(|remark| names.contains(remark.id.as_str()));
-            let told: Vec<FeatureRemark> = own
-                .map(|remark| FeatureRemark {
-                    leaves_out: matches!(remark.done, Done::LeftOut(_)),
-                    feature: remark.id,
-                    at_m: remark.at,
-                    found: remark.found,
-                    done: remark.done.text().to_owned(),
-                    degrades: false,
-                })
-                .collect();
-            found.remarks.extend(told);
+            found.remarks.extend(own.map(remark_of));
         }
         Ok(found)
     }
@@ -105,14 +98,5 @@ fn shape_of(feature: &VectorFeature, kind: ObjectKind, area: &GamingArea) -> Fou
                 false => FoundShape::Line(ring(line)),
             }
         }
-    }
-}
-
-fn bad_crs(written: &str, found: &str) -> GroundError {
-    GroundError::Impossible {
-        key: "objects.sources".into(),
-        found: format!("crs of {written}: {found}"),
-        expected: "a system that can be computed".into(),
-        hint: "give a code, as crs = \"EPSG:4326\"".into(),
     }
 }

@@ -106,7 +106,9 @@ impl Vectors {
         each: Each,
     ) -> Result<(), GroundError> {
         let FeatureSource::File { file, layer, kind, crs } = of else { return Ok(()) };
-        let crs = crs.as_deref().map(|text| Crs::named(text).map_err(|found| bad_crs(&file.written, &found)));
+        let crs = crs
+            .as_deref()
+            .map(|text| Crs::named(text).map_err(|found| bad_crs("features.sources", &file.written, &found)));
         let crs = crs.transpose()?;
         let mut keys: Vec<&str> = BUILT_IN_KEYS.into_iter().chain(spec.keys()).collect();
         keys.sort_unstable();
@@ -172,7 +174,7 @@ pub fn site(area: &GamingArea) -> Site {
     Site::new(area.frame.spacing, area.rect, side, side)
 }
 
-fn remark_of(Remark { id, at, found, done }: Remark) -> FeatureRemark {
+pub(super) fn remark_of(Remark { id, at, found, done }: Remark) -> FeatureRemark {
     FeatureRemark {
         feature: id,
         at_m: at,
@@ -183,9 +185,10 @@ fn remark_of(Remark { id, at, found, done }: Remark) -> FeatureRemark {
     }
 }
 
-fn bad_crs(written: &str, found: &str) -> GroundError {
+/// A source, listed under a key, whose system of coordinates cannot be computed.
+pub(super) fn bad_crs(key: &str, written: &str, found: &str) -> GroundError {
     GroundError::Impossible {
-        key: "features.sources".into(),
+        key: key.into(),
         found: format!("crs of {written}: {found}"),
         expected: "a system that can be computed".into(),
         hint: "give a code, as crs = \"EPSG:4326\"".into(),

@@ -7,6 +7,7 @@ use terrain::HOLE_CLASS;
 
 use crate::bounds::{FEATURE_SOURCES_MAX, NAME_CHARS_MAX, RULES_MAX, TAG_CHARS_MAX, TAGS_MAX};
 use crate::entry::{Entry, Section};
+use crate::feature_keys::RULES;
 use crate::files::{Mention, Place};
 use crate::{
     DemSource, Edges, FeatureSource, FeaturesSpec, HOLE_CLASS_NAME, HeightsFrom, ImportanceSpec, JobError, MethodName,
@@ -152,8 +153,8 @@ fn rule(item: &Entry, importance: &ImportanceSpec) -> Result<Rule, JobError> {
     let table = item.table()?;
     let tags = tags(&table.required("where")?)?;
     let kind = table.maybe("kind", Entry::word)?.unwrap_or(RuleKind::AsBuiltIn);
-    let others = ["class", "width_m", "grade_max_percent", "grade_give", "form", "z"].into_iter();
-    if let (RuleKind::None, Some(other)) = (kind, others.clone().find_map(|key| table.optional(key))) {
+    let mut others = RULES.iter().map(|key| key.name).filter(|name| !["where", "kind"].contains(name));
+    if let (RuleKind::None, Some(other)) = (kind, others.find_map(|key| table.optional(key))) {
         let hint = "remove it, or write another kind";
         return Err(other.conflict("kind = \"none\"", "no more keys, since these features are left out", hint));
     }

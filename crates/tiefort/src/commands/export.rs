@@ -7,15 +7,15 @@ use build::CompileError;
 use build::product::{BuiltFrom, Opened, read_told};
 use clap::Args;
 use exports::{
-    Block, CARRIES, Coordinates, Datum, Engine, ExportError, Facts, Forecast, HeightEncoding, LEFT_OUT, Levels, Mesh,
-    Product, TextureFile, Textures, WebMap, Work,
+    Block, CARRIES, Carries, Coordinates, Datum, Engine, ExportError, Facts, Forecast, Format, HeightEncoding,
+    LEFT_OUT, Levels, Mesh, Product, TextureFile, Textures, WebMap, Work,
 };
 use job::Job;
 use store::Folder;
 use terrain::{MaterialName, ModuleId, PostRect};
 use views::grouped;
 
-use super::export_formats::{ENCODINGS, ENGINES, Format, Layer, TEXTURES, material};
+use super::export_formats::{ENCODINGS, ENGINES, Layer, TEXTURES, material};
 use super::export_together::Several;
 use crate::arguments::{Workers, coordinates, one_of, row_col};
 use crate::failure::{Failure, Outcome};
@@ -69,7 +69,7 @@ pub struct Arguments {
     #[arg(value_name = "DIR", required = true)]
     databases: Vec<PathBuf>,
     /// What to write
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(CARRIES.map(|row| (row.name, row.format, row.meaning))))]
     format: Format,
     /// The south-west and north-east load module of a block, or a single one [default: the whole area]
     #[arg(long, value_name = "ROW,COL..ROW,COL", value_parser = block)]
@@ -203,62 +203,50 @@ pub fn checked(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
     several.export(work)
 }
 
+/// What is given, as it is written, and the formats that take it.
+type Refused = (fn(&Arguments) -> bool, &'static str, fn(&Carries) -> bool);
+
+/// Arguments that some formats alone have room for.
+const REFUSED: [Refused; 8] = [
+    (
+        |given| given.coordinates == Coordinates::Map,
+        "--coordinates map",
+        |row| matches!(row.format, Format::Ply | Format::Obj),
+    ),
+    (|given| given.layer.is_some(), "--layer", |row| row.format == Format::Geotiff),
+    (|given| given.assume_datum.is_some(), "--assume-datum", |row| row.is_for_globes),
+    (|given| !given.imagery.is_empty(), "--imagery", |row| row.textures != LEFT_OUT),
+    (|given| given.texture == TextureFile::Rgb, "--texture rgb", |row| row.format == Format::Openflight),
+    (|given| given.engine != Engine::Unreal, "--engine", |row| row.format == Format::Heightmap),
+    (|given| given.size.is_some(), "--size", |row| matches!(row.format, Format::Heightmap | Format::TerrainRgb)),
+    (|given| given.encoding.is_some(), "--encoding", |row| row.format == Format::TerrainRgb),
+];
+
 /// Refuses what cannot be, before any work.
 fn check(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.coordinates == Coordinates::Map && !matches!(arguments.format, Format::Ply | Format::Obj) {
-        let message = "found --coordinates map with a format that has no room for map coordinates, expected ply or obj";
-        return Err(Failure::new(message, "leave --coordinates out; NAME.json beside the file says where it lies"));
+    let carries = arguments.format.carries();
+    for (is_given, given, takes) in REFUSED {
+        if is_given(arguments) && !takes(carries) {
+            let expected: Vec<&str> = CARRIES.iter().filter(|row| takes(row)).map(|row| row.name).collect();
+            let expected = expected.join(", ");
+            let message = format!("found {given} with --format {}, expected a format of {expected}", carries.name);
+            return Err(Failure::new(message, "leave it out, or choose such a format"));
+        }
     }
     let residual = arguments.layer == Some(Layer::Residual);
-    if arguments.layer.is_some() && arguments.format != Format::Geotiff {
-        let message = "found --layer with another format than geotiff, expected none";
-        return Err(Failure::new(message, "leave --layer out, or add --format geotiff"));
-    }
-    if arguments.assume_datum.is_some() && !arguments.format.is_for_globes() {
-        let message = "found --assume-datum with a format whose heights stay as they are, expected none";
-        return Err(Failure::new(
-            message,
-            "leave --assume-datum out; only 3dtiles, 3dtiles-terrain, 3tz, quantized-mesh and mbtiles need it",
-        ));
-    }
-    let has_textures = arguments.format.carries().textures != LEFT_OUT;
-    if !arguments.imagery.is_empty() && !has_textures {
-        let with = CARRIES.iter().filter(|row| row.textures != LEFT_OUT).map(|row| row.format);
-        let expected = with.collect::<Vec<_>>().join(", ");
-        let message = format!("found --imagery with a format that has no textures, expected one of {expected}");
-        return Err(Failure::new(message, "leave --imagery out, or choose one of these formats"));
-    }
-    if arguments.texture == TextureFile::Rgb && arguments.format != Format::Openflight {
-        let message = "found --texture rgb with another format than openflight, expected jpeg or png";
-        return Err(Failure::new(message, "leave --texture out, or add --format openflight"));
-    }
-    let (is_heightmap, is_map) = (arguments.format == Format::Heightmap, arguments.format == Format::TerrainRgb);
-    if !is_heightmap && arguments.engine != Engine::Unreal {
-        let message = "found --engine with another format than heightmap, expected none";
-        return Err(Failure::new(message, "leave it out, or add --format heightmap"));
-    }
-    if !is_heightmap && !is_map && arguments.size.is_some() {
-        let message = "found --size with another format than heightmap and terrain-rgb, expected none";
-        return Err(Failure::new(message, "leave it out, or choose one of these formats"));
-    }
-    if !is_map && arguments.encoding.is_some() {
-        let message = "found --encoding with another format than terrain-rgb, expected none";
-        return Err(Failure::new(message, "leave it out, or add --format terrain-rgb"));
-    }
     if !arguments.against.is_empty() && !residual {
         let message = "found --against without --layer residual, expected both or none";
         return Err(Failure::new(message, "only a residual is taken against a raster"));
     }
-    let expected = arguments.format.extensions();
+    let expected = carries.extensions;
     if expected.is_empty() {
         return Ok(());
     }
     let found = files::extension(&arguments.out);
     if !expected.contains(&found.as_str()) {
-        let format = arguments.format.name();
         let quoted = expected.iter().map(|extension| format!("{extension:?}")).collect::<Vec<_>>().join(" or ");
         let message = format!("{}: found the extension {found:?}, expected {quoted}", arguments.out.display());
-        let hint = format!("--format {format} writes one file whose name ends in .{}", expected.join(" or ."));
+        let hint = format!("--format {} writes one file whose name ends in .{}", carries.name, expected.join(" or ."));
         return Err(Failure::new(message, hint));
     }
     files::check_writable(&arguments.out)
@@ -275,7 +263,8 @@ fn levels(arguments: &Arguments) -> Levels {
 
 /// Does it; what was exported, in words.
 fn export(arguments: &Arguments, work: &Work) -> Result<String, Failure> {
-    let folder = arguments.format.extensions().is_empty().then(|| NewFolder::begin(&arguments.out)).transpose()?;
+    let folder =
+        arguments.format.carries().extensions.is_empty().then(|| NewFolder::begin(&arguments.out)).transpose()?;
     let product = prepared(arguments, arguments.database(), work)?;
     tell_size(arguments, &product)?;
     match arguments.format {
@@ -367,7 +356,7 @@ fn open_imagery(arguments: &Arguments, product: &mut Product) -> Result<(), Fail
 /// What was exported, in words; `said` is what was done to heights.
 fn summary(format: Format, product: &Product, said: Option<Datum>) -> String {
     let triangles: usize = product.modules.iter().map(|module| module.triangles.len()).sum();
-    let triangles = triangles + if format.is_without_decks() { 0 } else { product.deck_triangles() };
+    let triangles = triangles + if format.carries().is_without_decks() { 0 } else { product.deck_triangles() };
     let modules = match product.modules.len() {
         1 => "1 load module".to_owned(),
         count => format!("{} load modules", grouped(count as u64)),

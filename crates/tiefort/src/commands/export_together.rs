@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use exports::{Covered, Datum, ExportError, Gap, Product, Put, Together, Work};
+use exports::{Covered, Datum, ExportError, Format, Gap, Product, Put, Together, Work};
 use store::Folder;
 use views::grouped;
 
-use super::export_formats::Format;
 use crate::failure::Failure;
 use crate::files;
 use crate::new_folder::NewFolder;
@@ -28,7 +27,7 @@ impl Several<'_> {
     /// Refuses what cannot be, before any work; `has_block` is whether load modules were chosen.
     pub(super) fn check(&self, has_block: bool) -> Result<(), Failure> {
         if !matches!(self.format, Format::Tiles3d | Format::Archive) {
-            let format = self.format.name();
+            let format = self.format.carries().name;
             let message = format!("found several databases with --format {format}, expected 3dtiles or 3tz");
             return Err(Failure::new(message, "name one database; tilesets alone have an index of several"));
         }

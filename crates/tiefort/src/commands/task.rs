@@ -18,13 +18,13 @@ Examples:
   tiefort task configs/ntc.toml refine 0,0 0,2 0,4 --out /share/ntc.tdb
   tiefort task configs/ntc.toml publish --out /share/ntc.tdb
 
-The order is: survey of every tile, allocate, refine of every tile after its
-lower-ranked neighbours, assemble of every tile (with clipped edges after its
-neighbours' refine), publish. A unit may be run any number of times, anywhere
-that shares the folder; one that finds its result published and fresh ends at
-once. Where the job surveys nothing, survey does nothing. publish makes whatever
-is missing or damaged, so it always ends with the result of a build, also where
-that is published already.
+Stages come in the order in which they are listed above, those of tiles for
+every tile: refine after that of its lower-ranked neighbours, assemble after
+refine of the tiles around it, too. A unit may be run any number of times,
+anywhere that shares the folder; one that finds its result published and fresh
+ends at once, and a stage that the job has no use for does nothing. publish makes
+whatever is missing or damaged, so it always ends with the result of a build,
+also where that is published already.
 
 Exit codes: 0 done; 1 published, with breaches; 2 failed, or, with --strict,
 published with breaches or warnings; 75 what it needs is not done yet: try again.";
