@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::engine::StoreError;
 use load_module_reader::ReadError;
-use terrain::{LoadModuleFault, ModuleId, TinFault};
+use terrain::TinFault;
 use thiserror::Error as ThisError;
 
 use crate::names::{FOLDERS, WORK, files};
@@ -176,16 +176,6 @@ pub enum DatabaseError {
         /// What is wrong with it.
         fault: Box<ReadError>,
     },
-    /// A load module has a crack or the like.
-    #[error("{}: load module {module}: {fault}", path.display())]
-    UnsoundModule {
-        /// The file.
-        path: PathBuf,
-        /// The load module.
-        module: ModuleId,
-        /// What is wrong with it.
-        fault: LoadModuleFault,
-    },
     /// The TIN of a tile has a crack or the like.
     #[error("{}: TIN: {fault}", path.display())]
     UnsoundTin {
@@ -323,7 +313,6 @@ impl DatabaseError {
             | Self::Malformed { .. }
             | Self::OtherTile { .. }
             | Self::Modules { .. }
-            | Self::UnsoundModule { .. }
             | Self::UnsoundTin { .. } => "run `tiefort build` again: it rebuilds what is damaged or missing",
             Self::Io { .. } | Self::TooLarge { .. } | Self::NotListed { .. } => return None,
         })

@@ -273,32 +273,32 @@ fn put_checksum(file: &mut Vec<u8>, start: usize) {
     file.extend_from_slice(&checksum.to_le_bytes());
 }
 
-/// The load modules, at their finest level, in the file at `path` that has these bytes, each checked with
-/// [`LoadModule::check`].
+/// The load modules, at their finest level, in the file at `path` that has these bytes; the reader holds that each
+/// is sound.
 ///
 /// # Errors
-/// When the file is not as it was written, or a load module in it is not sound.
+/// When the file is not as it was written.
 pub(crate) fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<LoadModule>), DatabaseError> {
     let (tile, levels) = decode_levels(path, bytes)?;
     let finest = levels.into_iter().next().expect("the reader refuses a file without a level");
     Ok((tile, finest))
 }
 
-/// The load modules at every level, the finest first, in the file at `path` that has these bytes, each checked with
-/// [`LoadModule::check`].
+/// The load modules at every level, the finest first, in the file at `path` that has these bytes; the reader holds that each
+/// is sound.
 ///
 /// # Errors
-/// When the file is not as it was written, or a load module in it is not sound.
+/// When the file is not as it was written.
 pub fn decode_levels(path: &Path, bytes: &[u8]) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
     let file = SlmFile::parse(bytes).map_err(damaged(path))?;
     let levels = (0..file.header().level_count).map(|level| file.level(level).unwrap_or(&[]));
-    of_levels(path, file.header(), levels)
+    Ok(of_levels(file.header(), levels))
 }
 
 /// The same of the load modules of `part` alone: the others are not looked at.
 ///
 /// # Errors
-/// When header or index are not as they were written, or a load module of the part is not sound.
+/// When header, index or a load module of the part are not as they were written.
 pub(crate) fn decode_part(
     path: &Path,
     bytes: &[u8],
@@ -306,25 +306,16 @@ pub(crate) fn decode_part(
 ) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
     let part = Block { south, west, north, east };
     let (header, levels) = SlmFile::parse_part(bytes, part).map_err(damaged(path))?;
-    of_levels(path, &header, levels.iter().map(Vec::as_slice))
+    Ok(of_levels(&header, levels.iter().map(Vec::as_slice)))
 }
 
 fn damaged(path: &Path) -> impl Fn(ReadError) -> DatabaseError {
     move |fault| DatabaseError::Modules { path: path.to_path_buf(), fault: Box::new(fault) }
 }
 
-fn of_levels<'a>(
-    path: &Path,
-    header: &Header,
-    levels: impl Iterator<Item = &'a [Module]>,
-) -> Result<(TileModules, Vec<Vec<LoadModule>>), DatabaseError> {
+fn of_levels<'a>(header: &Header, levels: impl Iterator<Item = &'a [Module]>) -> (TileModules, Vec<Vec<LoadModule>>) {
     let level = |modules: &[Module]| modules.iter().map(|module| load_module(module, header.side)).collect();
-    let levels: Vec<Vec<LoadModule>> = levels.map(level).collect();
-    for module in levels.iter().flatten() {
-        let unsound = |fault| DatabaseError::UnsoundModule { path: path.to_path_buf(), module: module.id, fault };
-        module.check().map_err(unsound)?;
-    }
-    Ok((tile_of(header), levels))
+    (tile_of(header), levels.map(level).collect())
 }
 
 fn tile_of(header: &Header) -> TileModules {

@@ -17,39 +17,6 @@ pub struct Decks {
     pub classes: Vec<u8>,
 }
 
-/// What is wrong with decks.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum DeckFault {
-    /// Lists that belong together differ in length, or are longer than 16 bits number.
-    Inconsistent,
-    /// This vertex lies beyond a side.
-    VertexOutside(usize),
-    /// This vertex is the corner of no triangle.
-    VertexUnused(usize),
-    /// Vertices or triangles are not in canonical order, or one is listed twice.
-    NotCanonical,
-    /// This triangle names a vertex that does not exist.
-    NoSuchVertex(usize),
-    /// This triangle is clockwise or upright.
-    NotCounterClockwise(usize),
-    /// This triangle has the class of holes.
-    HoleClass(usize),
-}
-
-impl std::fmt::Display for DeckFault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Inconsistent => f.write_str("lists that belong together differ in length, or are too long"),
-            Self::VertexOutside(vertex) => write!(f, "vertex {vertex} lies beyond a side"),
-            Self::VertexUnused(vertex) => write!(f, "vertex {vertex} is the corner of no triangle"),
-            Self::NotCanonical => f.write_str("vertices or triangles are out of order, or listed twice"),
-            Self::NoSuchVertex(triangle) => write!(f, "triangle {triangle} names a vertex that is not there"),
-            Self::NotCounterClockwise(triangle) => write!(f, "triangle {triangle} is clockwise or upright"),
-            Self::HoleClass(triangle) => write!(f, "triangle {triangle} has the class of holes"),
-        }
-    }
-}
-
 impl Decks {
     /// Decks in canonical order from triangles in any, each with its corners and its class. Equal corners are joined,
     /// and of triangles with the same corners the one of the lowest class stays.
@@ -90,35 +57,35 @@ impl Decks {
     /// need not cover the square, and may lie above each other.
     ///
     /// # Errors
-    /// The first fault found.
-    pub fn check(&self, side: u16) -> Result<(), DeckFault> {
+    /// The first fault found, in words.
+    pub fn check(&self, side: u16) -> Result<(), String> {
         let most = usize::from(u16::MAX);
         let is_numbered = self.vertices.len() <= most && self.triangles.len() <= 2 * most;
         if self.classes.len() != self.triangles.len() || !is_numbered {
-            return Err(DeckFault::Inconsistent);
+            return Err("lists that belong together differ in length, or are too long".into());
         }
         if let Some(vertex) = self.vertices.iter().position(|v| side < v.x || side < v.y) {
-            return Err(DeckFault::VertexOutside(vertex));
+            return Err(format!("vertex {vertex} lies beyond a side"));
         }
         let is_ascending = self.vertices.is_sorted_by(|a, b| a < b) && self.triangles.is_sorted_by(|a, b| a < b);
         if !is_ascending || !self.triangles.iter().all(|t| t[0] < t[1] && t[0] < t[2]) {
-            return Err(DeckFault::NotCanonical);
+            return Err("vertices or triangles are out of order, or listed twice".into());
         }
         let mut is_used = vec![false; self.vertices.len()];
         for (index, &triangle) in self.triangles.iter().enumerate() {
             if triangle.iter().any(|&v| self.vertices.len() <= usize::from(v)) {
-                return Err(DeckFault::NoSuchVertex(index));
+                return Err(format!("triangle {index} names a vertex that is not there"));
             }
             if self.doubled_area(triangle) <= 0 {
-                return Err(DeckFault::NotCounterClockwise(index));
+                return Err(format!("triangle {index} is clockwise or upright"));
             }
             triangle.iter().for_each(|&v| is_used[usize::from(v)] = true);
         }
         if let Some(vertex) = is_used.iter().position(|is_used| !is_used) {
-            return Err(DeckFault::VertexUnused(vertex));
+            return Err(format!("vertex {vertex} is the corner of no triangle"));
         }
         let hole = self.classes.iter().position(|&class| class == HOLE_CLASS);
-        hole.map_or(Ok(()), |triangle| Err(DeckFault::HoleClass(triangle)))
+        hole.map_or(Ok(()), |triangle| Err(format!("triangle {triangle} has the class of holes")))
     }
 }
 
@@ -161,28 +128,29 @@ mod tests {
     }
 
     #[track_caller]
-    fn check_fault(damage: impl FnOnce(&mut Decks), expected: DeckFault) {
+    fn check_fault(damage: impl FnOnce(&mut Decks), expected: &str) {
         let mut decks = crossing();
         damage(&mut decks);
-        assert_eq!(decks.check(SIDE), Err(expected));
+        assert_eq!(decks.check(SIDE), Err(expected.into()));
     }
 
     #[test]
     fn faults_of_decks_are_told_apart() {
-        check_fault(|decks| decks.classes.truncate(3), DeckFault::Inconsistent);
-        check_fault(|decks| decks.vertices[7].y = SIDE + 1, DeckFault::VertexOutside(7));
-        check_fault(|decks| decks.vertices.push(vertex(0, 101, 0)), DeckFault::VertexUnused(8));
-        check_fault(|decks| decks.vertices[0].z = decks.vertices[1].z, DeckFault::NotCanonical);
-        check_fault(|decks| decks.triangles.swap(0, 1), DeckFault::NotCanonical);
-        check_fault(|decks| decks.triangles[0].rotate_left(1), DeckFault::NotCanonical);
-        check_fault(|decks| decks.triangles[3][2] = 8, DeckFault::NoSuchVertex(3));
-        check_fault(|decks| decks.triangles[0].swap(1, 2), DeckFault::NotCounterClockwise(0));
-        check_fault(|decks| decks.classes[2] = HOLE_CLASS, DeckFault::HoleClass(2));
+        let out_of_order = "vertices or triangles are out of order, or listed twice";
+        check_fault(|decks| decks.classes.truncate(3), "lists that belong together differ in length, or are too long");
+        check_fault(|decks| decks.vertices[7].y = SIDE + 1, "vertex 7 lies beyond a side");
+        check_fault(|decks| decks.vertices.push(vertex(0, 101, 0)), "vertex 8 is the corner of no triangle");
+        check_fault(|decks| decks.vertices[0].z = decks.vertices[1].z, out_of_order);
+        check_fault(|decks| decks.triangles.swap(0, 1), out_of_order);
+        check_fault(|decks| decks.triangles[0].rotate_left(1), out_of_order);
+        check_fault(|decks| decks.triangles[3][2] = 8, "triangle 3 names a vertex that is not there");
+        check_fault(|decks| decks.triangles[0].swap(1, 2), "triangle 0 is clockwise or upright");
+        check_fault(|decks| decks.classes[2] = HOLE_CLASS, "triangle 2 has the class of holes");
     }
 
     #[test]
     fn an_upright_triangle_is_no_deck() {
         let wall = [vertex(0, 0, 0), vertex(9, 0, 0), vertex(9, 0, 5)];
-        assert_eq!(Decks::of_triangles([(wall, 0)]).check(SIDE), Err(DeckFault::NotCounterClockwise(0)));
+        assert_eq!(Decks::of_triangles([(wall, 0)]).check(SIDE), Err("triangle 0 is clockwise or upright".into()));
     }
 }

@@ -26,16 +26,16 @@ mod tile;
 pub use refined::{GainCurve, GainRun, Refusal, RefusedBy, StopReason, TileTin};
 pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
 mod decks;
-pub use decks::{DeckFault, Decks};
+pub use decks::Decks;
 mod module_line;
-pub use module_line::{LineFault, LineTraits, ModuleLine};
+pub use module_line::{LineTraits, ModuleLine};
 // A vertex, a residual, what a line is, and what stands on the ground are the same values here and in a file.
 pub use load_module_reader::{
     Canopy, Corner, LineForm, LineKind, LineStorey, ObjectKind, Objects, PRISMS_MAX, Prism, Residual as ModuleResidual,
     Vertex as ModuleVertex,
 };
 mod load_module;
-pub use load_module::{LoadModule, LoadModuleFault, ModuleCounts};
+pub use load_module::{LoadModule, ModuleCounts};
 mod choices;
 pub use choices::{Effort, HeightFit, LastBatch, Lattice, LodBorder, Resampling, Smooth, TileOrder};
 mod materials;

@@ -1,7 +1,7 @@
 //! A load module: what the simulator loads at once.
 
 use crate::decks::doubled_area;
-use crate::{DeckFault, Decks, LineFault, ModuleId, ModuleLine, ModuleResidual, ModuleVertex, Objects, module_line};
+use crate::{Decks, ModuleId, ModuleLine, ModuleResidual, ModuleVertex, Objects, module_line};
 
 /// One finished load module.
 ///
@@ -40,50 +40,6 @@ pub struct ModuleCounts {
     pub polygons: u32,
 }
 
-/// What is wrong with a load module.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LoadModuleFault {
-    /// This triangle names a vertex that does not exist.
-    NoSuchVertex(usize),
-    /// This vertex lies beyond a side.
-    VertexOutside(usize),
-    /// This triangle is clockwise or has no area.
-    NotCounterClockwise(usize),
-    /// Vertices or triangles are not in canonical order, or a vertex is listed twice.
-    NotCanonical,
-    /// Lists that belong together differ in length.
-    Inconsistent,
-    /// The doubled areas of the triangles add up to the first number, that of the square is the second.
-    AreaMissing(i64, i64),
-    /// This edge inside the square has a triangle on one side only, or is used twice in one direction.
-    Crack([ModuleVertex; 2]),
-    /// Decks are not as they must be.
-    InDecks(DeckFault),
-    /// Lines are not as they must be.
-    InLines(LineFault),
-}
-
-impl std::fmt::Display for LoadModuleFault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::NoSuchVertex(triangle) => write!(f, "triangle {triangle} names a vertex that is not there"),
-            Self::VertexOutside(vertex) => write!(f, "vertex {vertex} lies beyond a side"),
-            Self::NotCounterClockwise(triangle) => write!(f, "triangle {triangle} is clockwise or has no area"),
-            Self::NotCanonical => f.write_str("vertices or triangles are out of order, or listed twice"),
-            Self::Inconsistent => f.write_str("lists that belong together differ in length"),
-            Self::AreaMissing(found, expected) => {
-                write!(f, "triangles cover {found} half squares of a quantum, expected {expected}")
-            }
-            Self::Crack([a, b]) => {
-                let (from, to) = (format!("{},{}", a.x, a.y), format!("{},{}", b.x, b.y));
-                write!(f, "the edge {from} to {to} (quanta east, north) is not shared by two triangles")
-            }
-            Self::InDecks(fault) => write!(f, "decks: {fault}"),
-            Self::InLines(fault) => write!(f, "lines: {fault}"),
-        }
-    }
-}
-
 impl LoadModule {
     /// Doubled area of a triangle in squared quanta; positive when counter-clockwise.
     pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
@@ -116,48 +72,49 @@ impl LoadModule {
         self.vertices.iter().filter(on_border).count()
     }
 
-    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions, decks, lines.
+    /// Walks every invariant: indices, canonical order, orientation, area, cracks inside, T-junctions, decks, lines. It
+    /// shares no code with `load-module-reader`, which holds the same of what it reads.
     ///
     /// # Errors
-    /// The first fault found.
-    pub fn check(&self) -> Result<(), LoadModuleFault> {
+    /// The first fault found, in words.
+    pub fn check(&self) -> Result<(), String> {
         if self.classes.len() != self.triangles.len() {
-            return Err(LoadModuleFault::Inconsistent);
+            return Err("lists that belong together differ in length".into());
         }
         if let Some(vertex) = self.vertices.iter().position(|v| self.side < v.x || self.side < v.y) {
-            return Err(LoadModuleFault::VertexOutside(vertex));
+            return Err(format!("vertex {vertex} lies beyond a side"));
         }
         let distinct = self.vertices.windows(2).all(|pair| (pair[0].y, pair[0].x) < (pair[1].y, pair[1].x));
         let smallest_first = self.triangles.iter().all(|t| t[0] < t[1] && t[0] < t[2]);
         if !distinct || !smallest_first || !self.triangles.is_sorted() {
-            return Err(LoadModuleFault::NotCanonical);
+            return Err("vertices or triangles are out of order, or listed twice".into());
         }
         self.check_area()?;
         self.check_edges()?;
-        self.decks.check(self.side).map_err(LoadModuleFault::InDecks)?;
-        module_line::check(&self.lines, self.side).map_err(LoadModuleFault::InLines)
+        self.decks.check(self.side).map_err(|fault| format!("decks: {fault}"))?;
+        module_line::check(&self.lines, self.side).map_err(|fault| format!("lines: {fault}"))
     }
 
-    fn check_area(&self) -> Result<(), LoadModuleFault> {
+    fn check_area(&self) -> Result<(), String> {
         let mut area = 0;
         for (index, &triangle) in self.triangles.iter().enumerate() {
             if triangle.iter().any(|&v| self.vertices.len() <= usize::from(v)) {
-                return Err(LoadModuleFault::NoSuchVertex(index));
+                return Err(format!("triangle {index} names a vertex that is not there"));
             }
             let doubled = self.doubled_area(triangle);
             if doubled <= 0 {
-                return Err(LoadModuleFault::NotCounterClockwise(index));
+                return Err(format!("triangle {index} is clockwise or has no area"));
             }
             area += doubled;
         }
         let expected = 2 * i64::from(self.side) * i64::from(self.side);
         if area != expected {
-            return Err(LoadModuleFault::AreaMissing(area, expected));
+            return Err(format!("triangles cover {area} half squares of a quantum, expected {expected}"));
         }
         Ok(())
     }
 
-    fn check_edges(&self) -> Result<(), LoadModuleFault> {
+    fn check_edges(&self) -> Result<(), String> {
         let corners = |triangle: &[u16; 3]| [0, 1, 2].map(|corner| (triangle[corner], triangle[(corner + 1) % 3]));
         let mut edges: Vec<(u16, u16)> = self.triangles.iter().flat_map(corners).collect();
         edges.sort_unstable();
@@ -165,11 +122,9 @@ impl LoadModule {
             |&(from, to): &(u16, u16)| edges.binary_search(&(to, from)).is_err() && !self.on_one_side(from, to);
         let twice = edges.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0]);
         let open = || edges.iter().copied().find(is_open);
-        twice.or_else(open).map_or(Ok(()), |(from, to)| Err(self.crack(from, to)))
-    }
-
-    fn crack(&self, from: u16, to: u16) -> LoadModuleFault {
-        LoadModuleFault::Crack([self.vertices[usize::from(from)], self.vertices[usize::from(to)]])
+        let Some((from, to)) = twice.or_else(open) else { return Ok(()) };
+        let [from, to] = [from, to].map(|v| self.vertices[usize::from(v)]).map(|v| format!("{},{}", v.x, v.y));
+        Err(format!("the edge {from} to {to} (quanta east, north) is not shared by two triangles"))
     }
 
     fn on_one_side(&self, from: u16, to: u16) -> bool {
@@ -213,12 +168,28 @@ mod tests {
     fn faults_are_told_apart() {
         let mut module = square();
         module.triangles.swap(0, 1);
-        assert_eq!(module.check(), Err(LoadModuleFault::NotCanonical));
+        let told = "vertices or triangles are out of order, or listed twice";
+        assert_eq!(module.check(), Err(told.into()));
         let mut module = square();
         module.triangles.pop();
-        assert_eq!(module.check(), Err(LoadModuleFault::Inconsistent));
+        assert_eq!(module.check(), Err("lists that belong together differ in length".into()));
         module.classes.pop();
-        assert!(matches!(module.check(), Err(LoadModuleFault::AreaMissing(..))));
+        let told = "triangles cover 4096000000 half squares of a quantum, expected 8192000000";
+        assert_eq!(module.check(), Err(told.into()));
+        let mut module = square();
+        module.vertices[3].x += 1;
+        assert_eq!(module.check(), Err("vertex 3 lies beyond a side".into()));
+        let mut module = square();
+        module.triangles[1][2] = 4;
+        assert_eq!(module.check(), Err("triangle 1 names a vertex that is not there".into()));
+        let mut module = square();
+        module.triangles[1].swap(1, 2);
+        assert_eq!(module.check(), Err("triangle 1 is clockwise or has no area".into()));
+        // Two triangles over one half of the square, none over the other.
+        let mut module = square();
+        module.triangles[1] = [0, 1, 3];
+        let told = "the edge 0,0 to 64000,0 (quanta east, north) is not shared by two triangles";
+        assert_eq!(module.check(), Err(told.into()));
     }
 
     #[test]
@@ -230,6 +201,6 @@ mod tests {
         module.polygon_count = 1;
         assert_eq!((module.counts(), module.check()), (ModuleCounts { triangles: 3, polygons: 2 }, Ok(())));
         module.decks.triangles[0] = [0, 2, 1];
-        assert_eq!(module.check(), Err(LoadModuleFault::InDecks(DeckFault::NotCounterClockwise(0))));
+        assert_eq!(module.check(), Err("decks: triangle 0 is clockwise or upright".into()));
     }
 }
