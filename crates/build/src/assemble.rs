@@ -7,8 +7,8 @@ use job::{Borders, ClipHeights as JobClipHeights, Edges, Job, OuterBorder};
 use store::engine::{Artifact, Fingerprint, Key, Outcome, Stamp, keep_or_make};
 use store::{FileStamp, Measured, MeasuredModule, TileModules};
 use terrain::{
-    Decks, Dem, HOLE_CLASS, Importance, LatticePoint, LoadModule, ModuleCounts, ModuleLine, ModuleResidual, Post,
-    PostRect, TileId, Tin, Vertex, in_turn,
+    Decks, Dem, HOLE_CLASS, Importance, LatticePoint, LineTraits, LoadModule, ModuleCounts, ModuleLine, ModuleResidual,
+    Post, PostRect, TileId, Tin, Vertex, in_turn,
 };
 use tin::load_modules::{
     ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, put_decks, stand,
@@ -130,7 +130,7 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let steps_per_post = features.kept.steps_per_post;
     let lines = cut_lines(&features.lines, steps_per_post, &layout);
     let bridges = |lines: &Vec<ModuleLine>| -> Vec<ModuleLine> {
-        lines.iter().filter(|line| keys::has_deck(&line.traits)).cloned().collect()
+        lines.iter().filter(|line| keys::has_deck(&LineTraits::of(line))).cloned().collect()
     };
     let decks = cut_decks(&features.decks, steps_per_post, &layout).into_iter();
     let decks: Vec<_> = decks.zip(lines.iter().map(bridges)).collect();

@@ -10,7 +10,7 @@ use rusqlite::{Connection, ToSql, params};
 use source_files::geopackage_parts::{Extent, Layer, Package, add_index, line_z, polygon, polygon_z};
 use store::{Manifest, Report, ReportPlace};
 use terrain::{
-    Decks, HOLE_CLASS, LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleRect, ModuleVertex,
+    Decks, HOLE_CLASS, LineForm, LineKind, LineStorey, ModuleId, ModuleLine, ModuleRect, ModuleVertex,
     QUANTA_PER_METRE, metres_of_quanta,
 };
 
@@ -169,19 +169,19 @@ fn way_values(product: &Product, names: &[&str]) -> BTreeMap<u8, String> {
 }
 
 /// What a line is called by its kind, its form and where it runs.
-fn way_words(traits: &LineTraits) -> [&'static str; 3] {
-    let kind = match traits.kind {
+fn way_words(line: &ModuleLine) -> [&'static str; 3] {
+    let kind = match line.kind {
         LineKind::Travelled => "travelled",
         LineKind::Channel => "channel",
         LineKind::Breakline => "breakline",
     };
-    let form = match traits.form {
+    let form = match line.form {
         LineForm::Nothing => "none",
         LineForm::Line => "line",
         LineForm::Strip => "strip",
         LineForm::Bench => "bench",
     };
-    let storey = match traits.storey {
+    let storey = match line.storey {
         LineStorey::Ground => "ground",
         LineStorey::Bridge => "bridge",
         LineStorey::Tunnel => "tunnel",
@@ -301,7 +301,7 @@ impl Layers<'_> {
         for (module, lines) in product.modules.iter().zip(&product.lines) {
             for line in lines {
                 let places: Vec<[f64; 3]> = line.vertices.iter().map(|v| place_m(product, module.id, *v)).collect();
-                let [kind, form, storey] = way_words(&line.traits);
+                let [kind, form, storey] = way_words(line);
                 add.execute(params![
                     line_z(self.0.srs, &places),
                     module.id.row,
@@ -311,9 +311,9 @@ impl Layers<'_> {
                     kind,
                     form,
                     storey,
-                    line.traits.is_kept,
-                    line.traits.is_in_ground,
-                    metres_of_quanta(line.traits.width.into()),
+                    line.is_kept,
+                    line.is_in_ground,
+                    metres_of_quanta(line.width.into()),
                 ])?;
             }
         }

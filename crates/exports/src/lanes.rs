@@ -119,13 +119,12 @@ impl<'a> Found<'a> {
 
 /// Whether a line is the middle of a band of triangles: of the ground, of a deck or of a ribbon.
 fn is_drawn(line: &ModuleLine) -> bool {
-    let traits = &line.traits;
-    traits.form != LineForm::Nothing && traits.kind != LineKind::Breakline && 0 < traits.width
+    line.form != LineForm::Nothing && line.kind != LineKind::Breakline && 0 < line.width
 }
 
 fn part((line, corner): (&ModuleLine, [i32; 2])) -> (Same, Vec<[i32; 2]>) {
     let place = |vertex: &terrain::ModuleVertex| [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y)];
-    let same = (line.traits.kind, line.class, line.traits.width);
+    let same = (line.kind, line.class, line.width);
     (same, line.vertices.iter().map(place).collect())
 }
 

@@ -188,7 +188,7 @@ impl Product {
     /// The lines of a level, which is no finer than its own.
     fn lines_at(&self, level: usize) -> Vec<Vec<ModuleLine>> {
         let is_left_out = |class: &u8| self.left_out.iter().take(level).flatten().any(|other| other == class);
-        let stays = |line: &&ModuleLine| !line.traits.is_in_ground || !is_left_out(&line.class);
+        let stays = |line: &&ModuleLine| !line.is_in_ground || !is_left_out(&line.class);
         self.lines.iter().map(|lines| lines.iter().filter(stays).cloned().collect()).collect()
     }
 

@@ -9,8 +9,8 @@ use store::{
     ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
 };
 use terrain::{
-    Canopy, Corner, Decks, GridFrame, HOLE_CLASS, LineForm, LineKind, LineStorey, LineTraits, LoadModule, ModuleGrid,
-    ModuleId, ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, ObjectKind, Prism, Spacing, TileId,
+    Canopy, Corner, Decks, GridFrame, HOLE_CLASS, LineForm, LineKind, LineStorey, LoadModule, ModuleGrid, ModuleId,
+    ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, ObjectKind, Prism, Spacing, TileId,
 };
 
 use crate::archives::gathered;
@@ -164,11 +164,7 @@ pub(crate) fn with_ways() -> Product {
     let line = |class, kind, width, places: &[[u16; 2]]| {
         let vertices = places.iter().map(|&[x, y]| ModuleVertex { y, x, z: 0 }).collect();
         let (form, storey) = (LineForm::Line, LineStorey::Ground);
-        ModuleLine {
-            class,
-            traits: LineTraits { kind, form, storey, is_kept: true, is_in_ground: true, width },
-            vertices,
-        }
+        ModuleLine { class, kind, form, storey, is_kept: true, is_in_ground: true, width, vertices }
     };
     let road = |places: &[[u16; 2]]| line(1, LineKind::Travelled, 896, places);
     let stream = line(2, LineKind::Channel, 256, &[[50_000, 0], [50_000, 64_000]]);

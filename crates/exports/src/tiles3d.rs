@@ -321,7 +321,7 @@ impl Layer {
         }
         let least = step.error_m * f64::from(QUANTA_PER_METRE);
         let bands = self.product.lines.iter().flatten().filter(|line| is_band(line));
-        let widest = bands.map(|line| line.traits.width).max().unwrap_or(0);
+        let widest = bands.map(|line| line.width).max().unwrap_or(0);
         for (sheet, part) in &mut parts {
             match sheet {
                 // Woods cover ground, which would have another colour without them.

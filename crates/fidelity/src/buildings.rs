@@ -12,9 +12,8 @@ const HEADROOM: i32 = 256;
 pub fn metres_in_buildings(module: &LoadModule) -> u64 {
     let buildings: Vec<(&Prism, [[u16; 2]; 2])> =
         module.objects.prisms.iter().filter(|prism| prism.kind == ObjectKind::Building).map(with_bounds).collect();
-    let is_road = |line: &&ModuleLine| {
-        line.traits.kind == LineKind::Travelled && line.traits.storey == LineStorey::Ground && line.traits.is_kept
-    };
+    let is_road =
+        |line: &&ModuleLine| line.kind == LineKind::Travelled && line.storey == LineStorey::Ground && line.is_kept;
     let is_inside = |&[x, y, z]: &[f64; 3]| {
         buildings.iter().any(|(prism, [low, high])| {
             let bounds = [x, y].into_iter().enumerate();
@@ -78,7 +77,7 @@ mod tests {
                 polygon_count: 0,
                 residual: ModuleResidual::default(),
                 decks: Decks::default(),
-                lines: vec![ModuleLine { class: 0, traits, vertices }],
+                lines: vec![traits.line(0, vertices)],
                 objects: Objects { prisms: vec![prism], ..Objects::default() },
             })
         };

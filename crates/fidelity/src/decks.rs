@@ -132,7 +132,7 @@ fn deepest(module: &LoadModule) -> u32 {
 /// Class of each line in the ground that the line of a bridge crosses, and how high the bridge passes over it, in
 /// quanta: lines that meet at an end, as those of a bridge and of the way that goes on from it, do not cross.
 fn crossed(lines: &[ModuleLine]) -> Vec<(u8, i32)> {
-    let is_bridge = |line: &&ModuleLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
+    let is_bridge = |line: &&ModuleLine| line.storey == LineStorey::Bridge && line.is_kept;
     let bridges: Vec<Segment> = lines.iter().filter(is_bridge).flat_map(segments).collect();
     let crossings = |line: &ModuleLine| -> Vec<(u8, i32)> {
         let pairs = segments(line).into_iter().flat_map(|under| bridges.iter().map(move |over| (over, under)));
@@ -149,7 +149,7 @@ fn passed(module: &LoadModule) -> Vec<(u8, i32)> {
         corners.map(|corner| [f64::from(corner.x), f64::from(corner.y), f64::from(corner.z)])
     };
     let decks: Vec<[[f64; 3]; 3]> = module.decks.triangles.iter().map(deck).collect();
-    let bridges = module.lines.iter().filter(|line| line.traits.storey == LineStorey::Bridge);
+    let bridges = module.lines.iter().filter(|line| line.storey == LineStorey::Bridge);
     let end = |vertex: &ModuleVertex| [f64::from(vertex.x), f64::from(vertex.y)];
     let ends: Vec<[f64; 2]> =
         bridges.flat_map(|line| line.vertices.first().into_iter().chain(line.vertices.last())).map(end).collect();
@@ -182,9 +182,9 @@ fn steepest(module: &LoadModule) -> u32 {
 /// in the data, or of a kind that is not read.
 fn hanging(module: &LoadModule) -> Vec<u32> {
     let is_inside = |vertex: &ModuleVertex| [vertex.x, vertex.y].iter().all(|at| (1..module.side).contains(at));
-    let kept = || module.lines.iter().filter(|line| line.traits.is_kept);
+    let kept = || module.lines.iter().filter(|line| line.is_kept);
     let ends = |line: &ModuleLine| line.vertices.first().into_iter().chain(line.vertices.last()).copied().collect();
-    let bridges = kept().filter(|line| line.traits.storey == LineStorey::Bridge);
+    let bridges = kept().filter(|line| line.storey == LineStorey::Bridge);
     let ends: Vec<ModuleVertex> = bridges.flat_map(|line| -> Vec<ModuleVertex> { ends(line) }).collect();
     let goes_on = |end: &ModuleVertex| {
         let at = |vertex: &&ModuleVertex| [vertex.x, vertex.y] == [end.x, end.y];
@@ -201,10 +201,10 @@ fn hanging(module: &LoadModule) -> Vec<u32> {
 /// several ends belongs to that from which it rises least.
 fn highest_step(module: &LoadModule) -> u32 {
     let is_inside = |vertex: &ModuleVertex| [vertex.x, vertex.y].iter().all(|at| (1..module.side).contains(at));
-    let is_bridge = |line: &&ModuleLine| line.traits.storey == LineStorey::Bridge && line.traits.is_kept;
+    let is_bridge = |line: &&ModuleLine| line.storey == LineStorey::Bridge && line.is_kept;
     let ends = |line: &ModuleLine| -> Vec<End> {
         let [.., before_last, last] = line.vertices[..] else { return Vec::new() };
-        let reach = END_PART * f64::from(line.traits.width);
+        let reach = END_PART * f64::from(line.width);
         [(line.vertices[0], line.vertices[1]), (last, before_last)].map(|(at, next)| End { at, next, reach }).into()
     };
     let is_on_ground = |end: &End| (ground_under(module, &end.at) - f64::from(end.at.z)).abs() <= ON_GROUND;
@@ -248,7 +248,7 @@ fn ground_under(module: &LoadModule, vertex: &ModuleVertex) -> f64 {
 
 /// Whether a line is one that bridges pass over.
 fn is_below(line: &ModuleLine) -> bool {
-    line.traits.storey == LineStorey::Ground && line.traits.is_in_ground
+    line.storey == LineStorey::Ground && line.is_in_ground
 }
 
 /// Two neighbouring vertices of a line, and which of them are its ends.
@@ -339,7 +339,7 @@ mod tests {
             is_in_ground: storey == LineStorey::Ground,
             width: 640,
         };
-        ModuleLine { class, traits, vertices: places.iter().map(|&(x, y, z)| vertex(x, y, z)).collect() }
+        traits.line(class, places.iter().map(|&(x, y, z)| vertex(x, y, z)).collect())
     }
 
     /// A load module of 100 m at height 0, its northern half of class 1, under a deck of 20 m by 10 m over both halves.
@@ -426,7 +426,7 @@ mod tests {
             line(1, LineStorey::Ground, &[(4000, 6280, 0), (4640, 6280, 12), (5280, 6280, 0)]),
             line(2, LineStorey::Tunnel, &[(4000, 6300, 0), (5280, 6300, 0)]),
         ];
-        module.lines[4].traits.is_kept = false;
+        module.lines[4].is_kept = false;
         assert_eq!(DeckFigures::of(&module).clearance, [(1, 500)].into());
         // A road alongside, under the deck's side: told where it is apart from the bridge's ends.
         let ends = [(4000, 0, 256), (5280, 0, 256), (5280, 10_240, 768), (4000, 10_240, 768)];

@@ -1,12 +1,13 @@
-//! Decks of bridges: one more part of a load module in files of versions 2 and 3, decoded and checked.
+//! Decks of bridges: one more part of a load module in files of versions 2 and 3, put in order, decoded and checked.
 
 use crate::bytes::{Cursor, check_section};
+use crate::vertex::doubled_area;
 use crate::{HOLE_CLASS, Header, IndexEntry, ReadError, Section, Vertex};
 
 /// The decks above the ground of a load module, as one mesh; without decks all lists are empty.
 ///
 /// They cover what they cover: a place may lie under no deck, or under several. A deck that crosses the line between
-/// two load modules is cut there, and both have the same vertices on it.
+/// two load modules is cut there, and both have the same vertices on it. Equal decks have equal lists.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Decks {
     /// Sorted by y, then x, then z; each a corner of some triangle.
@@ -18,9 +19,39 @@ pub struct Decks {
 }
 
 impl Decks {
+    /// Decks in canonical order from triangles in any, each with its corners and its class. Equal corners are joined,
+    /// and of triangles with the same corners the one of the lowest class stays.
+    ///
+    /// # Panics
+    /// When there are more vertices than 16 bits number.
+    pub fn of_triangles(triangles: impl IntoIterator<Item = ([Vertex; 3], u8)>) -> Self {
+        let soup: Vec<([Vertex; 3], u8)> = triangles.into_iter().collect();
+        let mut vertices: Vec<Vertex> = soup.iter().flat_map(|(corners, _)| *corners).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        assert!(vertices.len() <= usize::from(u16::MAX), "the decks of a load module number vertices in 16 bits");
+        let index = |corner: &Vertex| vertices.partition_point(|vertex| vertex < corner) as u16;
+        let mut listed: Vec<([u16; 3], u8)> = Vec::with_capacity(soup.len());
+        for (corners, class) in &soup {
+            let mut triangle = [0, 1, 2].map(|corner| index(&corners[corner]));
+            let smallest = (0..3).min_by_key(|&corner| triangle[corner]).unwrap_or(0);
+            triangle.rotate_left(smallest);
+            listed.push((triangle, *class));
+        }
+        listed.sort_unstable();
+        listed.dedup_by_key(|(triangle, _)| *triangle);
+        let (triangles, classes) = listed.into_iter().unzip();
+        Self { vertices, triangles, classes }
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.triangles.is_empty()
+    }
+
+    /// Doubled area of a triangle in squared quanta; positive when counter-clockwise. Zero for an index out of range.
+    pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
+        doubled_area(&self.vertices, triangle)
     }
 
     /// The part of a file of version 2 that follows the section `entry` names.
@@ -103,9 +134,7 @@ fn read_triangles(cursor: &mut Cursor, vertices: &[Vertex], side: u16, count: u3
         let smallest_first = triangle[0] < triangle[1] && triangle[0] < triangle[2];
         let sorted = triangles.last().is_none_or(|last| *last < triangle);
         cursor.expect(offset, "order of triangles", i64::from(smallest_first && sorted), 1)?;
-        let [a, b, c] = triangle.map(|v| vertices[usize::from(v)]).map(|v| [i64::from(v.x), i64::from(v.y)]);
-        let doubled = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        cursor.within(offset, "doubled area of a triangle", doubled, (1, square))?;
+        cursor.within(offset, "doubled area of a triangle", doubled_area(vertices, triangle), (1, square))?;
         triangles.push(triangle);
     }
     let unused = is_used.iter().filter(|&&is_used| !is_used).count() as i64;

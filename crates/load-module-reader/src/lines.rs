@@ -58,8 +58,9 @@ impl LineStorey {
 
 /// The middle line of a way, or of a part of it in which nothing changes, in the square of one load module.
 ///
-/// A way that goes on in the next load module has the same vertex there, at the same place and height.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A way that goes on in the next load module has the same vertex there, at the same place and height. Lines are in
+/// order by their fields.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Line {
     /// Class of its way; never [`HOLE_CLASS`].
     pub class: u8,
@@ -77,14 +78,6 @@ pub struct Line {
     pub width: u16,
     /// Two or more; neighbours differ in place.
     pub vertices: Vec<Vertex>,
-}
-
-impl Line {
-    /// What lines are sorted by.
-    fn key(&self) -> impl Ord {
-        let Self { class, kind, form, storey, is_kept, is_in_ground, width, ref vertices } = *self;
-        (class, kind, form, storey, is_kept, is_in_ground, width, vertices)
-    }
 }
 
 /// The lines of a part of `length` bytes, in the square of a load module with sides of `side` quanta.
@@ -107,7 +100,7 @@ pub(crate) fn parse(cursor: &mut Cursor, length: u32, side: u16) -> Result<Vec<L
     for (mut line, count) in lines {
         let offset = cursor.offset();
         line.vertices = read_vertices(cursor, count, side)?;
-        let sorted = all.last().is_none_or(|last| last.key() < line.key());
+        let sorted = all.last().is_none_or(|last| *last < line);
         cursor.expect(offset, "order of lines", i64::from(sorted), 1)?;
         all.push(line);
     }

@@ -7,6 +7,7 @@
 
 use crate::bytes::{Cursor, check_section};
 use crate::parts::Parts;
+use crate::vertex::doubled_area;
 use crate::{
     Decks, FIXED_MODULE_BYTES, Header, IndexEntry, Line, Objects, QUANTA_PER_METRE, ReadError, Section, VERSION, Vertex,
 };
@@ -67,11 +68,7 @@ pub struct Module {
 impl Module {
     /// Doubled area of a triangle in squared quanta; positive when counter-clockwise. Zero for an index out of range.
     pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
-        let corner = |v: u16| self.vertices.get(usize::from(v)).map(|v| (i64::from(v.x), i64::from(v.y)));
-        match triangle.map(corner) {
-            [Some(a), Some(b), Some(c)] => (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0),
-            _ => 0,
-        }
+        doubled_area(&self.vertices, triangle)
     }
 
     /// The section that `entry` names, of the load module at (`row`, `col`), and the parts that follow it.

@@ -26,3 +26,12 @@ impl PartialOrd for Vertex {
         Some(self.cmp(other))
     }
 }
+
+/// Doubled area of a triangle in squared quanta; positive when counter-clockwise. Zero for an index out of range.
+pub(crate) fn doubled_area(vertices: &[Vertex], triangle: [u16; 3]) -> i64 {
+    let corner = |v: u16| vertices.get(usize::from(v)).map(|v| (i64::from(v.x), i64::from(v.y)));
+    match triangle.map(corner) {
+        [Some(a), Some(b), Some(c)] => (b.0 - a.0) * (c.1 - a.1) - (b.1 - a.1) * (c.0 - a.0),
+        _ => 0,
+    }
+}

@@ -2,8 +2,8 @@
 
 use terrain::{
     Decks, GainCurve, GainRun, GridFrame, LatticePoint, LineForm, LineKind, LineStorey, LineTraits, LoadModule,
-    ModuleGrid, ModuleId, ModuleLine, ModuleRect, ModuleResidual, ModuleVertex, Post, PostRect, Refusal, RefusedBy,
-    Spacing, StopReason, TileId, TileTin, Tin, Vertex,
+    ModuleGrid, ModuleId, ModuleRect, ModuleResidual, ModuleVertex, Post, PostRect, Refusal, RefusedBy, Spacing,
+    StopReason, TileId, TileTin, Tin, Vertex,
 };
 
 use crate::{
@@ -193,7 +193,7 @@ pub(crate) fn levels_with_lines() -> Vec<Vec<LoadModule>> {
     let line = |class, kind, form, is_kept, places: &[(u16, u16, i32)]| {
         let storey = LineStorey::Ground;
         let traits = LineTraits { kind, form, storey, is_kept, is_in_ground: is_kept, width: 640 };
-        ModuleLine { class, traits, vertices: places.iter().copied().map(vertex).collect() }
+        traits.line(class, places.iter().copied().map(vertex).collect())
     };
     let road = |places| line(1, LineKind::Travelled, LineForm::Strip, true, places);
     let out = line(2, LineKind::Travelled, LineForm::Nothing, false, &[(0, 0, -5), (900, 0, -6)]);

@@ -8,8 +8,7 @@ use load_module_reader::{
     VERSION_WITH_DECKS,
 };
 use terrain::{
-    Decks, GridFrame, LineTraits, LoadModule, ModuleGrid, ModuleId, ModuleLine, ModuleRect, ModuleVertex, Side,
-    Spacing, TileId,
+    Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleLine, ModuleRect, ModuleVertex, Side, Spacing, TileId,
 };
 
 use crate::{DatabaseError, Fingerprint};
@@ -236,12 +235,11 @@ fn line_part(lines: &[ModuleLine]) -> Vec<u8> {
     let mut part = Vec::new();
     let vertices: usize = lines.iter().map(|line| line.vertices.len()).sum();
     put_u32s(&mut part, [lines.len() as u32, vertices as u32]);
-    for ModuleLine { class, traits, vertices } in lines {
-        let LineTraits { is_kept, is_in_ground, width, .. } = *traits;
-        let [kind, form, storey] = [traits.kind as u8, traits.form as u8, traits.storey as u8];
-        part.extend([*class, kind, form, u8::from(is_kept) | u8::from(is_in_ground) << 1 | storey << 2]);
-        let count = u16::try_from(vertices.len()).expect("a line numbers its vertices in 16 bits");
-        put_u16s(&mut part, [width, count]);
+    for line in lines {
+        let flags = u8::from(line.is_kept) | u8::from(line.is_in_ground) << 1 | (line.storey as u8) << 2;
+        part.extend([line.class, line.kind as u8, line.form as u8, flags]);
+        let count = u16::try_from(line.vertices.len()).expect("a line numbers its vertices in 16 bits");
+        put_u16s(&mut part, [line.width, count]);
     }
     lines.iter().for_each(|line| put_vertices(&mut part, &line.vertices));
     part
@@ -335,28 +333,10 @@ fn tile_of(header: &Header) -> TileModules {
 
 /// A load module as the reader gives it, whose square has sides of `side` quanta.
 pub fn load_module(module: &Module, side: u16) -> LoadModule {
-    LoadModule {
-        id: ModuleId { row: module.row, col: module.col },
-        side,
-        vertices: module.vertices.clone(),
-        triangles: module.triangles.clone(),
-        classes: module.classes.clone(),
-        polygon_count: module.polygon_count,
-        residual: module.residual,
-        decks: Decks {
-            vertices: module.decks.vertices.clone(),
-            triangles: module.decks.triangles.clone(),
-            classes: module.decks.classes.clone(),
-        },
-        lines: module.lines.iter().map(module_line).collect(),
-        objects: module.objects.clone(),
-    }
-}
-
-fn module_line(line: &load_module_reader::Line) -> ModuleLine {
-    let load_module_reader::Line { class, kind, form, storey, is_kept, is_in_ground, width, ref vertices } = *line;
-    let traits = LineTraits { kind, form, storey, is_kept, is_in_ground, width };
-    ModuleLine { class, traits, vertices: vertices.clone() }
+    let Module { row, col, vertices, triangles, classes, polygon_count, residual, decks, lines, objects, .. } =
+        module.clone();
+    let id = ModuleId { row, col };
+    LoadModule { id, side, vertices, triangles, classes, polygon_count, residual, decks, lines, objects }
 }
 
 #[cfg(test)]

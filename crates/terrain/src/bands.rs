@@ -13,9 +13,8 @@ type Order = (LineKind, u8);
 
 /// Whether a line is a band: a way in the ground that has a width, and no triangles of its own.
 pub fn is_band(line: &ModuleLine) -> bool {
-    let traits = &line.traits;
-    let is_way = traits.kind != LineKind::Breakline && traits.form == LineForm::Line;
-    traits.is_in_ground && is_way && 0 < traits.width
+    let is_way = line.kind != LineKind::Breakline && line.form == LineForm::Line;
+    line.is_in_ground && is_way && 0 < line.width
 }
 
 /// Pieces of bands by load module and class. Places are quanta from the south-west corner of the rectangle of load
@@ -106,11 +105,7 @@ impl Band {
     /// That of a line of a load module whose south-west corner stands at `corner`.
     fn of(line: &ModuleLine, corner: At) -> Self {
         let place = |vertex: &crate::ModuleVertex| [corner[0] + i32::from(vertex.x), corner[1] + i32::from(vertex.y)];
-        Self {
-            order: (line.traits.kind, line.class),
-            width: line.traits.width,
-            places: line.vertices.iter().map(place).collect(),
-        }
+        Self { order: (line.kind, line.class), width: line.width, places: line.vertices.iter().map(place).collect() }
     }
 }
 

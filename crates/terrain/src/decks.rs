@@ -1,92 +1,40 @@
-//! Decks of bridges: triangles that hang above the ground of a load module and are no part of it.
+//! What holds of decks of bridges: triangles that hang above the ground of a load module and are no part of it.
 
-use crate::{HOLE_CLASS, ModuleVertex};
+use crate::{Decks, HOLE_CLASS, ModuleVertex};
 
-/// The decks in the square of one load module, as one mesh; most load modules have none, and then all lists are empty.
+/// Walks every invariant of decks in a square of `side` quanta: lengths, order, places, orientation, classes. They
+/// need not cover the square, and may lie above each other.
 ///
-/// Unlike the ground, decks cover what they cover: places may lie under no deck, or under several that cross above each
-/// other. A deck that crosses the line between two load modules is cut there, and both have the same vertices on it.
-/// Vertices are sorted by (y, x, z), triangles by their corners, smallest first; so equal decks give equal bytes.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Decks {
-    /// Vertices in canonical order, each a corner of some triangle.
-    pub vertices: Vec<ModuleVertex>,
-    /// Corners of each triangle in `vertices`, counter-clockwise seen from above, smallest index first.
-    pub triangles: Vec<[u16; 3]>,
-    /// Class of each triangle; never [`HOLE_CLASS`].
-    pub classes: Vec<u8>,
-}
-
-impl Decks {
-    /// Decks in canonical order from triangles in any, each with its corners and its class. Equal corners are joined,
-    /// and of triangles with the same corners the one of the lowest class stays.
-    ///
-    /// # Panics
-    /// When there are more vertices than 16 bits number.
-    pub fn of_triangles(triangles: impl IntoIterator<Item = ([ModuleVertex; 3], u8)>) -> Self {
-        let soup: Vec<([ModuleVertex; 3], u8)> = triangles.into_iter().collect();
-        let mut vertices: Vec<ModuleVertex> = soup.iter().flat_map(|(corners, _)| *corners).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        assert!(vertices.len() <= usize::from(u16::MAX), "the decks of a load module number vertices in 16 bits");
-        let index = |corner: &ModuleVertex| vertices.partition_point(|vertex| vertex < corner) as u16;
-        let mut listed: Vec<([u16; 3], u8)> = Vec::with_capacity(soup.len());
-        for (corners, class) in &soup {
-            let mut triangle = [0, 1, 2].map(|corner| index(&corners[corner]));
-            let smallest = (0..3).min_by_key(|&corner| triangle[corner]).unwrap_or(0);
-            triangle.rotate_left(smallest);
-            listed.push((triangle, *class));
-        }
-        listed.sort_unstable();
-        listed.dedup_by_key(|(triangle, _)| *triangle);
-        let (triangles, classes) = listed.into_iter().unzip();
-        Self { vertices, triangles, classes }
+/// # Errors
+/// The first fault found, in words.
+pub fn check_decks(decks: &Decks, side: u16) -> Result<(), String> {
+    let most = usize::from(u16::MAX);
+    let is_numbered = decks.vertices.len() <= most && decks.triangles.len() <= 2 * most;
+    if decks.classes.len() != decks.triangles.len() || !is_numbered {
+        return Err("lists that belong together differ in length, or are too long".into());
     }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.triangles.is_empty() && self.vertices.is_empty()
+    if let Some(vertex) = decks.vertices.iter().position(|v| side < v.x || side < v.y) {
+        return Err(format!("vertex {vertex} lies beyond a side"));
     }
-
-    /// Doubled area of a triangle seen from above, in squared quanta; positive when counter-clockwise.
-    pub fn doubled_area(&self, triangle: [u16; 3]) -> i64 {
-        doubled_area(&self.vertices, triangle)
+    let is_ascending = decks.vertices.is_sorted_by(|a, b| a < b) && decks.triangles.is_sorted_by(|a, b| a < b);
+    if !is_ascending || !decks.triangles.iter().all(|t| t[0] < t[1] && t[0] < t[2]) {
+        return Err("vertices or triangles are out of order, or listed twice".into());
     }
-
-    /// Walks every invariant of decks in a square of `side` quanta: lengths, order, places, orientation, classes. They
-    /// need not cover the square, and may lie above each other.
-    ///
-    /// # Errors
-    /// The first fault found, in words.
-    pub fn check(&self, side: u16) -> Result<(), String> {
-        let most = usize::from(u16::MAX);
-        let is_numbered = self.vertices.len() <= most && self.triangles.len() <= 2 * most;
-        if self.classes.len() != self.triangles.len() || !is_numbered {
-            return Err("lists that belong together differ in length, or are too long".into());
+    let mut is_used = vec![false; decks.vertices.len()];
+    for (index, &triangle) in decks.triangles.iter().enumerate() {
+        if triangle.iter().any(|&v| decks.vertices.len() <= usize::from(v)) {
+            return Err(format!("triangle {index} names a vertex that is not there"));
         }
-        if let Some(vertex) = self.vertices.iter().position(|v| side < v.x || side < v.y) {
-            return Err(format!("vertex {vertex} lies beyond a side"));
+        if doubled_area(&decks.vertices, triangle) <= 0 {
+            return Err(format!("triangle {index} is clockwise or upright"));
         }
-        let is_ascending = self.vertices.is_sorted_by(|a, b| a < b) && self.triangles.is_sorted_by(|a, b| a < b);
-        if !is_ascending || !self.triangles.iter().all(|t| t[0] < t[1] && t[0] < t[2]) {
-            return Err("vertices or triangles are out of order, or listed twice".into());
-        }
-        let mut is_used = vec![false; self.vertices.len()];
-        for (index, &triangle) in self.triangles.iter().enumerate() {
-            if triangle.iter().any(|&v| self.vertices.len() <= usize::from(v)) {
-                return Err(format!("triangle {index} names a vertex that is not there"));
-            }
-            if self.doubled_area(triangle) <= 0 {
-                return Err(format!("triangle {index} is clockwise or upright"));
-            }
-            triangle.iter().for_each(|&v| is_used[usize::from(v)] = true);
-        }
-        if let Some(vertex) = is_used.iter().position(|is_used| !is_used) {
-            return Err(format!("vertex {vertex} is the corner of no triangle"));
-        }
-        let hole = self.classes.iter().position(|&class| class == HOLE_CLASS);
-        hole.map_or(Ok(()), |triangle| Err(format!("triangle {triangle} has the class of holes")))
+        triangle.iter().for_each(|&v| is_used[usize::from(v)] = true);
     }
+    if let Some(vertex) = is_used.iter().position(|is_used| !is_used) {
+        return Err(format!("vertex {vertex} is the corner of no triangle"));
+    }
+    let hole = decks.classes.iter().position(|&class| class == HOLE_CLASS);
+    hole.map_or(Ok(()), |triangle| Err(format!("triangle {triangle} has the class of holes")))
 }
 
 /// Doubled area of a triangle seen from above, in squared quanta; positive when counter-clockwise.
@@ -117,21 +65,21 @@ mod tests {
     #[test]
     fn decks_from_triangles_in_any_order_are_sound_and_equal() {
         let decks = crossing();
-        assert_eq!(decks.check(SIDE), Ok(()));
+        assert_eq!(check_decks(&decks, SIDE), Ok(()));
         assert_eq!((decks.vertices.len(), decks.classes.clone()), (8, vec![2, 2, 3, 3]));
         let corners = |triangle: &[u16; 3]| triangle.map(|v| decks.vertices[usize::from(v)]);
         let soup = decks.triangles.iter().map(corners).zip(decks.classes.iter().copied());
         let turned = soup.map(|([a, b, c], class)| ([b, c, a], class)).rev();
         let twice: Vec<_> = turned.clone().chain(turned).collect();
         assert_eq!(Decks::of_triangles(twice), decks);
-        assert!(Decks::of_triangles([]).is_empty() && Decks::default().check(SIDE) == Ok(()));
+        assert!(Decks::of_triangles([]).is_empty() && check_decks(&Decks::default(), SIDE) == Ok(()));
     }
 
     #[track_caller]
     fn check_fault(damage: impl FnOnce(&mut Decks), expected: &str) {
         let mut decks = crossing();
         damage(&mut decks);
-        assert_eq!(decks.check(SIDE), Err(expected.into()));
+        assert_eq!(check_decks(&decks, SIDE), Err(expected.into()));
     }
 
     #[test]
@@ -151,6 +99,9 @@ mod tests {
     #[test]
     fn an_upright_triangle_is_no_deck() {
         let wall = [vertex(0, 0, 0), vertex(9, 0, 0), vertex(9, 0, 5)];
-        assert_eq!(Decks::of_triangles([(wall, 0)]).check(SIDE), Err("triangle 0 is clockwise or upright".into()));
+        assert_eq!(
+            check_decks(&Decks::of_triangles([(wall, 0)]), SIDE),
+            Err("triangle 0 is clockwise or upright".into())
+        );
     }
 }

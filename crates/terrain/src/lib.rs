@@ -26,13 +26,13 @@ mod tile;
 pub use refined::{GainCurve, GainRun, Refusal, RefusedBy, StopReason, TileTin};
 pub use tile::{ModuleGrid, ModuleId, ModuleRect, SeamSides, Side, TileId};
 mod decks;
-pub use decks::Decks;
+pub use decks::check_decks;
 mod module_line;
-pub use module_line::{LineTraits, ModuleLine};
-// A vertex, a residual, what a line is, and what stands on the ground are the same values here and in a file.
+pub use module_line::LineTraits;
+// Vertices, residuals, decks, lines, and what stands on the ground are the same values here and in a file.
 pub use load_module_reader::{
-    Canopy, Corner, LineForm, LineKind, LineStorey, ObjectKind, Objects, PRISMS_MAX, Prism, Residual as ModuleResidual,
-    Vertex as ModuleVertex,
+    Canopy, Corner, Decks, Line as ModuleLine, LineForm, LineKind, LineStorey, ObjectKind, Objects, PRISMS_MAX, Prism,
+    Residual as ModuleResidual, Vertex as ModuleVertex,
 };
 mod load_module;
 pub use load_module::{LoadModule, ModuleCounts};

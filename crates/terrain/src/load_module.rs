@@ -1,6 +1,6 @@
 //! A load module: what the simulator loads at once.
 
-use crate::decks::doubled_area;
+use crate::decks::{check_decks, doubled_area};
 use crate::{Decks, ModuleId, ModuleLine, ModuleResidual, ModuleVertex, Objects, module_line};
 
 /// One finished load module.
@@ -91,7 +91,7 @@ impl LoadModule {
         }
         self.check_area()?;
         self.check_edges()?;
-        self.decks.check(self.side).map_err(|fault| format!("decks: {fault}"))?;
+        check_decks(&self.decks, self.side).map_err(|fault| format!("decks: {fault}"))?;
         module_line::check(&self.lines, self.side).map_err(|fault| format!("lines: {fault}"))
     }
 

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{HOLE_CLASS, LineForm, LineKind, LineStorey, ModuleVertex};
+use crate::{HOLE_CLASS, LineForm, LineKind, LineStorey, ModuleLine, ModuleVertex};
 
 /// Writes what a line is as its number in files, and reads it.
 macro_rules! by_number {
@@ -49,18 +49,19 @@ pub struct LineTraits {
     pub width: u16,
 }
 
-/// A line in the square of one load module, whose line it crosses at vertices only.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct ModuleLine {
-    /// Class of its way; never [`HOLE_CLASS`].
-    pub class: u8,
-    /// What else is known of it.
-    pub traits: LineTraits,
-    /// Two or more; neighbours differ in place.
-    pub vertices: Vec<ModuleVertex>,
-}
-
 impl LineTraits {
+    /// Those of a line of a load module.
+    pub fn of(line: &ModuleLine) -> Self {
+        let ModuleLine { class: _, kind, form, storey, is_kept, is_in_ground, width, vertices: _ } = *line;
+        Self { kind, form, storey, is_kept, is_in_ground, width }
+    }
+
+    /// The line of a load module that has them, its class, and its vertices.
+    pub fn line(self, class: u8, vertices: Vec<ModuleVertex>) -> ModuleLine {
+        let Self { kind, form, storey, is_kept, is_in_ground, width } = self;
+        ModuleLine { class, kind, form, storey, is_kept, is_in_ground, width, vertices }
+    }
+
     /// Whether its fields fit together: what is in the ground is kept and on the ground, and what is there has a form.
     pub fn fit(&self) -> bool {
         let Self { form, storey, is_kept, is_in_ground, .. } = *self;
@@ -75,7 +76,7 @@ impl LineTraits {
 /// The first fault found, in words.
 pub(crate) fn check(lines: &[ModuleLine], side: u16) -> Result<(), String> {
     for (number, line) in lines.iter().enumerate() {
-        let ModuleLine { class, traits, vertices } = line;
+        let ModuleLine { class, vertices, .. } = line;
         if !(2..=usize::from(u16::MAX)).contains(&vertices.len()) {
             return Err(format!("line {number} has fewer than two vertices, or too many"));
         }
@@ -88,7 +89,7 @@ pub(crate) fn check(lines: &[ModuleLine], side: u16) -> Result<(), String> {
         if *class == HOLE_CLASS {
             return Err(format!("line {number} has the class of holes"));
         }
-        if !traits.fit() {
+        if !LineTraits::of(line).fit() {
             return Err(format!("line {number} is in the ground and left out"));
         }
     }
@@ -101,16 +102,16 @@ mod tests {
     use super::*;
 
     fn line(north: u16) -> ModuleLine {
-        let traits = LineTraits {
+        ModuleLine {
+            class: 3,
             kind: LineKind::Travelled,
             form: LineForm::Strip,
             storey: LineStorey::Ground,
             is_kept: true,
             is_in_ground: true,
             width: 896,
-        };
-        let vertices = vec![ModuleVertex { y: north, x: 0, z: 5 }, ModuleVertex { y: north, x: 64_000, z: -5 }];
-        ModuleLine { class: 3, traits, vertices }
+            vertices: vec![ModuleVertex { y: north, x: 0, z: 5 }, ModuleVertex { y: north, x: 64_000, z: -5 }],
+        }
     }
 
     #[track_caller]
@@ -127,8 +128,8 @@ mod tests {
         check_fault(|lines| lines[0].vertices[1].x = 64_001, "a vertex of line 0 lies beyond a side");
         check_fault(|lines| lines[0].vertices[1].x = 0, "line 0 has two neighbours at one place");
         check_fault(|lines| lines[1].class = HOLE_CLASS, "line 1 has the class of holes");
-        check_fault(|lines| lines[0].traits.is_kept = false, "line 0 is in the ground and left out");
-        check_fault(|lines| lines[0].traits.is_in_ground = false, "line 0 is in the ground and left out");
+        check_fault(|lines| lines[0].is_kept = false, "line 0 is in the ground and left out");
+        check_fault(|lines| lines[0].is_in_ground = false, "line 0 is in the ground and left out");
         check_fault(|lines| lines.swap(0, 1), "lines are out of order, or one is listed twice");
     }
 }

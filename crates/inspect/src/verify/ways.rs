@@ -65,7 +65,7 @@ impl Ways {
             let ground = Ground::of(&module, first_class, aside);
             for line in &module.lines {
                 let name = names.get(usize::from(line.class)).map_or("", String::as_str);
-                ways.add(line, family(line.traits.kind, name), &ground);
+                ways.add(line, family(line.kind, name), &ground);
             }
         }
         ways
@@ -74,21 +74,20 @@ impl Ways {
     fn add(&mut self, line: &ModuleLine, family: u8, ground: &Ground) {
         let places: Vec<At> = line.vertices.iter().map(|vertex| ground.square.at(vertex.y, vertex.x)).collect();
         let heights: Vec<i32> = line.vertices.iter().map(|vertex| vertex.z).collect();
-        let traits = line.traits;
         // A channel in a tunnel is one that passes below a road.
-        if traits.is_kept && (traits.storey != LineStorey::Tunnel || traits.kind == LineKind::Channel) {
+        if line.is_kept && (line.storey != LineStorey::Tunnel || line.kind == LineKind::Channel) {
             self.found.kept_m += places.windows(2).map(length_m).sum::<f64>();
         }
-        if traits.is_in_ground {
-            self.look(&places, &heights, traits.kind, ground);
+        if line.is_in_ground {
+            self.look(&places, &heights, line.kind, ground);
             let off = places.iter().zip(&heights).map(|(&at, &height)| (ground.off_m(at, height), at));
             self.off.extend(off.filter(|(off_m, _)| OFF_MAX_M < *off_m));
         }
-        if traits.is_kept && traits.storey == LineStorey::Bridge {
+        if line.is_kept && line.storey == LineStorey::Bridge {
             let bare = stretches(&places, &heights, |ends, heights| ground.undecked(ends, heights));
             self.undecked.extend(bare.into_iter().filter(|(long_m, _)| BARE_MIN_M < *long_m));
         }
-        if traits.kind == LineKind::Breakline {
+        if line.kind == LineKind::Breakline {
             return;
         }
         let last = places.len() - 1;
@@ -98,11 +97,11 @@ impl Ways {
             // What passes on a bridge or in a tunnel does not meet what ends below or above it, also where it is cut
             // between two load modules.
             let is_cut = || ground.square.is_side(place);
-            meeting.goes_on |= !traits.is_kept && (traits.storey == LineStorey::Ground || is_end && !is_cut());
-            meeting.is_passed |= traits.is_kept && !is_end;
-            if traits.is_kept && is_end {
+            meeting.goes_on |= !line.is_kept && (line.storey == LineStorey::Ground || is_end && !is_cut());
+            meeting.is_passed |= line.is_kept && !is_end;
+            if line.is_kept && is_end {
                 meeting.kept_ends = meeting.kept_ends.saturating_add(1);
-                meeting.is_tunnel |= traits.storey == LineStorey::Tunnel;
+                meeting.is_tunnel |= line.storey == LineStorey::Tunnel;
             }
         }
     }

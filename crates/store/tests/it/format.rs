@@ -75,7 +75,7 @@ fn example_with_a_deck() -> Vec<u8> {
 fn line(class: u8, form: LineForm, storey: LineStorey, width: u16, ends: [ModuleVertex; 2]) -> ModuleLine {
     let is_kept = form != LineForm::Nothing;
     let traits = LineTraits { kind: LineKind::Travelled, form, storey, is_kept, is_in_ground: false, width };
-    ModuleLine { class, traits, vertices: ends.to_vec() }
+    traits.line(class, ends.to_vec())
 }
 
 /// The bridge with the line of its road, and a track that is left out.

@@ -67,7 +67,7 @@ fn clear_decks(
     let corners = |triangle: &[u16; 3]| triangle.map(|corner| ground.vertices[usize::from(corner)]);
     let mut soup: Soup = ground.triangles.iter().map(corners).zip(ground.classes.iter().copied()).collect();
     let before = soup.len();
-    let lines: Vec<&ModuleLine> = lines.iter().filter(|line| line.traits.is_in_ground).collect();
+    let lines: Vec<&ModuleLine> = lines.iter().filter(|line| line.is_in_ground).collect();
     let is_natural = |class: u8| !is_of_features(class);
     while soup.len() + 2 <= before + most {
         let found = (0..soup.len()).filter(|&at| is_natural(soup[at].1)).filter_map(|number| {
@@ -282,7 +282,7 @@ mod tests {
             is_in_ground: true,
             width: 0,
         };
-        let way = ModuleLine { class: ROAD, traits, vertices: vec![vertex(0, 0, 0), vertex(SIDE, SIDE - 1280, 1280)] };
+        let way = traits.line(ROAD, vec![vertex(0, 0, 0), vertex(SIDE, SIDE - 1280, 1280)]);
         let mut ground = whole.clone();
         clear_decks(&mut ground, &deck(), &[way], |class| class == ROAD, 12);
         let has = |at: &[u16; 3]| {

@@ -179,7 +179,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use terrain::{ModuleGrid, Spacing, SurfaceGround};
+    use terrain::{ModuleGrid, Spacing, SurfaceGround, check_decks};
 
     fn layout() -> Layout {
         let grid = ModuleGrid { rows: 2, cols: 3, side_cells: 20 };
@@ -245,7 +245,7 @@ mod tests {
         let line = 20 * 64;
         let ring = [(100, line - 333, 0), (117, line + 401, 900), (137, line + 400, 900), (120, line - 334, 0)];
         let cut = cut_alone(deck(&ring));
-        cut.iter().for_each(|decks| assert_eq!(decks.check(layout.side()), Ok(())));
+        cut.iter().for_each(|decks| assert_eq!(check_decks(decks, layout.side()), Ok(())));
         let on = |index: usize, x: u16| -> Vec<(u16, i32)> {
             cut[index].vertices.iter().filter(|v| v.x == x).map(|v| (v.y, v.z)).collect()
         };

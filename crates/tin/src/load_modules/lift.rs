@@ -366,7 +366,7 @@ impl<'a> Lift<'a> {
 fn at_end(vertex: ModuleVertex, bridges: &[ModuleLine], ground: &LoadModule) -> Option<f64> {
     let is_inside = |end: &ModuleVertex| place(*end).iter().all(|at| 0 < *at && *at < ground.side);
     let is_beside = |line: &ModuleLine| {
-        let reach = END_PART * f64::from(line.traits.width);
+        let reach = END_PART * f64::from(line.width);
         let ends = [line.vertices.first(), line.vertices.last()].into_iter().flatten();
         ends.filter(|end| is_inside(end)).any(|end| apart(at(*end), at(vertex)) <= reach)
     };
@@ -472,7 +472,7 @@ pub(super) fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleResidual};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleResidual, check_decks};
 
     const SIDE: u16 = 12_800;
 
@@ -516,7 +516,7 @@ mod tests {
     fn a_deck_through_a_hill_rises_over_it_and_its_ends_stay() {
         let ground = hill(1000, 0);
         let lifted = lift_decks(&deck(500), &[], &ground, 4);
-        assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
+        assert_eq!((check_decks(&lifted, SIDE), lifted.triangles.len()), (Ok(()), 4));
         assert!(400.0 < deepest(&deck(500), &ground) && deepest(&lifted, &ground) == 0.0);
         assert!(lifted.vertices.contains(&vertex(0, 6000, 500)), "its ends stay");
         // The hill is 400 quanta beside its corners, and 6,400 from its end.
@@ -530,7 +530,7 @@ mod tests {
         // From side to side, over the top of the hill.
         let [a, b, c, d] = [(0, 6390), (SIDE, 6390), (SIDE, 6410), (0, 6410)].map(at);
         let lifted = lift_decks(&Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3)]), &[], &ground, 4);
-        assert_eq!(lifted.check(SIDE), Ok(()));
+        assert_eq!(check_decks(&lifted, SIDE), Ok(()));
         assert!((lifted.triangles.len(), lifted.vertices.len()) == (4, 5), "{lifted:?}");
         assert!(lifted.vertices.contains(&vertex(6400, 6400, 2999)), "{lifted:?}");
     }
@@ -544,7 +544,7 @@ mod tests {
         let [e, f] = [(SIDE, 6390), (SIDE, 6410)].map(at);
         let decks = Decks::of_triangles([([a, b, c], 3), ([a, c, d], 3), ([b, e, c], 3), ([e, f, c], 3)]);
         let lifted = lift_decks(&decks, &[], &ground, 4);
-        assert_eq!((lifted.check(SIDE), lifted.triangles.len()), (Ok(()), 4));
+        assert_eq!((check_decks(&lifted, SIDE), lifted.triangles.len()), (Ok(()), 4));
         let [before, after] = [&decks, &lifted].map(|decks| deepest(decks, &ground));
         assert!(2000.0 < before && after < ADDED_FOR, "{before} {after} {lifted:?}");
     }
@@ -558,7 +558,7 @@ mod tests {
         let mut ground = hill(0, 0);
         (ground.vertices, ground.triangles) = (places.map(at).to_vec(), triangles);
         let lifted = lift_decks(&deck(0), &[], &ground, 8);
-        assert_eq!(lifted.check(SIDE), Ok(()));
+        assert_eq!(check_decks(&lifted, SIDE), Ok(()));
         assert!(deepest(&lifted, &ground) <= ADDED_FOR, "{} {lifted:?}", deepest(&lifted, &ground));
         assert!(lifted.vertices.iter().all(|vertex| vertex.z < 3300), "{lifted:?}");
     }
@@ -604,7 +604,7 @@ mod tests {
             width: 640,
         };
         let vertices = vec![vertex(2000, 6320, 313), vertex(10_800, 6320, 313)];
-        let lifted = lift_decks(&deck, &[ModuleLine { class: 3, traits, vertices }], &ground, 8);
+        let lifted = lift_decks(&deck, &[traits.line(3, vertices)], &ground, 8);
         assert!(highest_end(&lifted) <= Some(320) && deepest(&lifted, &ground) <= ADDED_FOR, "{lifted:?}");
     }
 }

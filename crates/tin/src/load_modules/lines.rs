@@ -22,8 +22,7 @@ pub fn cut_lines(lines: &[WayLine], steps_per_post: i32, layout: &Layout) -> Vec
             let (row, col) = same[0];
             if let Some(slot) = layout.slot(row as i32, col as i32) {
                 let vertices = line.vertices[from..=to].iter().map(|&vertex| local(vertex, same[0], step, layout));
-                let line = ModuleLine { class: line.class, traits: line.traits, vertices: vertices.collect() };
-                modules[slot].push(line);
+                modules[slot].push(line.traits.line(line.class, vertices.collect()));
             }
             from = to;
         }

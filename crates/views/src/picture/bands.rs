@@ -45,7 +45,7 @@ fn away_m(id: ModuleId, side_m: f64, place_m: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleLine, ModuleVertex};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleVertex};
 
     use super::super::color::FEATURES;
     use super::super::scene::SceneLimits;
@@ -67,7 +67,7 @@ mod tests {
         let mut modules = samples::modules();
         for module in &mut modules[..2] {
             let vertex = |x| ModuleVertex { y: 32_000, x, z: 0 };
-            module.lines = vec![ModuleLine { class: 1, traits, vertices: vec![vertex(0), vertex(64_000)] }];
+            module.lines = vec![traits.line(1, vec![vertex(0), vertex(64_000)])];
         }
         modules
     }

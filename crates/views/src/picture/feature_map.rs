@@ -72,7 +72,7 @@ mod tests {
     use crate::samples;
     use store::{FeatureLine, FeatureRemark};
     use terrain::Role;
-    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleLine, ModuleVertex};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleVertex};
 
     fn line(role: Role, vertices: Vec<[f64; 3]>) -> FeatureLine {
         FeatureLine {
@@ -131,7 +131,7 @@ mod tests {
         };
         // On the middle of a row of pixels.
         let vertex = |x| ModuleVertex { y: 31_680, x, z: 0 };
-        modules[0].lines = vec![ModuleLine { class: 1, traits, vertices: vec![vertex(0), vertex(64_000)] }];
+        modules[0].lines = vec![traits.line(1, vec![vertex(0), vertex(64_000)])];
         let limits = SceneLimits::default();
         let features = SceneFeatures { names: &names, classes: &[1], lines: &[], remarks: &[] };
         let scene = Scene { features: Some(features), ..samples::scene(&modules, &limits) };

@@ -53,7 +53,7 @@ pub(crate) fn draw_left_out(image: &mut Image, map_extent: &MapExtent, scene: &S
     let mut any = false;
     for module in scene.modules {
         let corner = [module.id.col, module.id.row].map(|number| f64::from(number) * side_m);
-        for line in module.lines.iter().filter(|line| !line.traits.is_kept) {
+        for line in module.lines.iter().filter(|line| !line.is_kept) {
             let Some(number) = features.color_of(line.class) else { continue };
             any = true;
             let at = |vertex: &ModuleVertex| {
