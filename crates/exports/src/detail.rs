@@ -1,9 +1,11 @@
 //! Levels of detail inside files: the one list of a product's levels from fine to coarse, how far each lies from the
 //! ground, and from how far away it will do.
 
+use std::collections::BTreeSet;
+
 use terrain::{HOLE_CLASS, LoadModule, ModuleRect, QUANTA_PER_METRE};
 
-use crate::triangle_index::{Cells, corners_of, height_in};
+use crate::triangle_index::{cells_of, corners_of, height_in};
 use crate::{Mesh, Product};
 
 /// Metres of distance at which a metre of error will do: it is a milliradian there, about a pixel of a picture that is
@@ -75,9 +77,14 @@ fn largest_distance_m(one: &Product, other: &Product, rect: ModuleRect) -> f64 {
     let mut largest = 0.0;
     for id in rect.iter() {
         let Some((one, other)) = one.module(id).zip(other.module(id)) else { continue };
-        let cells = Cells::of(other);
+        let cells = cells_of(other);
         for corners in ground_of(one) {
-            for number in cells.meeting(corners) {
+            let mut met = BTreeSet::new();
+            cells.any_under(corners.map(|[x, y, _]| [x, y]), |number| {
+                met.insert(number);
+                false
+            });
+            for number in met {
                 if other.classes[number as usize] != HOLE_CLASS {
                     largest = f64::max(largest, distance(corners, corners_of(other, other.triangles[number as usize])));
                 }

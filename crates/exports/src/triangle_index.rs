@@ -1,7 +1,8 @@
 //! The triangle of a product's ground at any place, found by the cells of its load module.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
+use terrain::geometry::Cells;
 use terrain::{LoadModule, ModuleId, QUANTA_PER_METRE};
 
 use crate::Product;
@@ -41,55 +42,17 @@ impl<'a> TriangleIndex<'a> {
             return None;
         }
         let (module, place) = module_at(product, place_m)?;
-        let cells = self.cells.entry(module.id).or_insert_with(|| Cells::of(module));
-        triangle_at(module, cells.candidates(place), place)
+        let cells = self.cells.entry(module.id).or_insert_with(|| cells_of(module));
+        triangle_at(module, cells.at(place), place)
     }
 }
 
-/// Numbers of the triangles of a load module that may meet each of its cells.
-pub(crate) struct Cells {
-    per_side: usize,
-    side: f64,
-    triangles: Vec<Vec<u32>>,
-}
-
-impl Cells {
-    pub(crate) fn of(module: &LoadModule) -> Self {
-        let per_side = (module.triangles.len() / TRIANGLES_PER_CELL).isqrt().clamp(1, CELLS_MAX);
-        let mut cells =
-            Self { per_side, side: f64::from(module.side), triangles: vec![Vec::new(); per_side * per_side] };
-        for (number, triangle) in (0..).zip(&module.triangles) {
-            let corners = triangle.map(|v| module.vertices[usize::from(v)]);
-            let range = |places: [u16; 3]| {
-                let [a, b, c] = places.map(|place| cells.cell(f64::from(place)));
-                a.min(b).min(c)..=a.max(b).max(c)
-            };
-            let (rows, cols) = (range(corners.map(|v| v.y)), range(corners.map(|v| v.x)));
-            for at in rows.flat_map(|row| cols.clone().map(move |col| row * per_side + col)) {
-                cells.triangles[at].push(number);
-            }
-        }
-        cells
-    }
-
-    /// The row or column of a place.
-    fn cell(&self, quanta: f64) -> usize {
-        ((quanta / self.side * self.per_side as f64) as usize).min(self.per_side - 1)
-    }
-
-    /// Numbers of the triangles that may meet another one, each once.
-    pub(crate) fn meeting(&self, corners: [[f64; 3]; 3]) -> BTreeSet<u32> {
-        let range = |axis: usize| {
-            let [a, b, c] = corners.map(|corner| self.cell(corner[axis]));
-            a.min(b).min(c)..=a.max(b).max(c)
-        };
-        let cells = range(1).flat_map(|row| range(0).map(move |col| row * self.per_side + col));
-        cells.flat_map(|at| &self.triangles[at]).copied().collect()
-    }
-
-    fn candidates(&self, [x, y]: [f64; 2]) -> &[u32] {
-        &self.triangles[self.cell(y) * self.per_side + self.cell(x)]
-    }
+/// The triangles of a load module, by number, in cells over its square.
+pub(crate) fn cells_of(module: &LoadModule) -> Cells {
+    let (side, count) = (f64::from(module.side), module.triangles.len());
+    let per_side = (count / TRIANGLES_PER_CELL).isqrt().clamp(1, CELLS_MAX);
+    let plan = |number: u32| corners_of(module, module.triangles[number as usize]).map(|[x, y, _]| [x, y]);
+    Cells::new([0.0; 2], [side; 2], side / per_side as f64, count as u32, plan)
 }
 
 /// The load module at an easting and northing, and the place in it in quanta.

@@ -37,7 +37,6 @@ mod decks;
 pub use decks::DeckFigures;
 mod places;
 pub use places::residuals_at_places;
-mod cells;
 mod triangles;
 pub use triangles::Triangles;
 mod posts;

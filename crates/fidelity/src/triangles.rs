@@ -3,9 +3,8 @@
 //! Places are east and north in posts of the working grid, heights are in quanta; both are `f64`. A vertex on the
 //! lattice keeps its place exactly, and vertices of two load modules at one place keep equal ones.
 
+use terrain::geometry::Cells;
 use terrain::{LoadModule, ModuleGrid, PostRect, Spacing, Tin};
-
-use crate::cells::Cells;
 
 /// Side of a cell in posts, at least and at most.
 const CELL_POSTS: (f64, f64) = (2.0, 64.0);
@@ -130,7 +129,7 @@ impl Triangles {
     /// Between two edges the ground is straight, so it is enough to look where an edge is crossed.
     pub(crate) fn hide(&self, eye: [f64; 3], target: [f64; 3]) -> bool {
         let sight = Sight::new(eye, target);
-        self.cells.any_along([place_of(eye), place_of(target)], |triangle| {
+        self.cells.any_under([place_of(eye), place_of(target)], |triangle| {
             let corners = self.corners_of(triangle).map(|corner| sight.seen(corner));
             (0..3).any(|i| sight.is_cut_by(corners[i], corners[(i + 1) % 3]))
         })

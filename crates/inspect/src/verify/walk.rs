@@ -116,6 +116,7 @@ impl OfLevel {
             self.own.push(format!("load module {id}: missing"));
             return;
         };
+        // The reader has passed it; this opinion shares no code with it.
         let fault = module.check().err();
         if fault.is_none() {
             self.sums.decks.merge(&DeckFigures::of(&module));

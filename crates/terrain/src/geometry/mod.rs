@@ -1,7 +1,8 @@
 //! Exact questions about posts: left or right, inside a circle, under a triangle, across a line.
 //!
 //! Topology is decided in integers only; there is no epsilon. The triangle scan answers, for the posts
-//! under a triangle, how far the DEM lies from its plane, in wrapping lanes that are proven exact.
+//! under a triangle, how far the DEM lies from its plane, in wrapping lanes that are proven exact. Only what measures
+//! and shows looks triangles up by place in `f64`, in [`Cells`].
 
 pub mod cut;
 pub mod owned;
@@ -20,6 +21,8 @@ mod surface;
 pub use surface::{Surface, WORKING_POSTS_MAX};
 mod blocks;
 pub use blocks::Blocks;
+mod cells;
+pub use cells::Cells;
 mod scan;
 pub use scan::{
     WIDENED_MAX, largest_numerator, locate, locate_all, rounded, squares_sum, visit_owned, visit_posts, widened,

@@ -1,4 +1,4 @@
-//! A grid of square cells over the area, each of which lists the outlines that touch it.
+//! A grid of square cells over some ground, each of which lists the outlines that touch it.
 //!
 //! ```text
 //!   +----+----+----+      An outline is entered row of cells by row of cells: its part inside a row spans some
@@ -17,7 +17,7 @@ const MARGIN: f64 = 1e-6;
 
 /// Which outlines touch which cell.
 #[derive(Clone, Debug)]
-pub(crate) struct Cells {
+pub struct Cells {
     south_west: [f64; 2],
     side: f64,
     rows: usize,
@@ -70,10 +70,11 @@ impl Cells {
         self.list(last_below(row, self.rows), last_below(col, self.cols))
     }
 
-    /// Whether `test` holds for anything that may lie under the straight line between two places.
-    pub fn any_along(&self, line: [[f64; 2]; 2], mut test: impl FnMut(u32) -> bool) -> bool {
+    /// Whether `test` holds for anything that may lie under a convex outline, such as the straight line between two
+    /// places. The same item may come more than once.
+    pub fn any_under<const N: usize>(&self, outline: [[f64; 2]; N], mut test: impl FnMut(u32) -> bool) -> bool {
         let mut found = false;
-        self.each_row(&line, |row, mut span| {
+        self.each_row(&outline, |row, mut span| {
             found = found || span.any(|col| self.list(row, col).iter().any(|&item| test(item)));
         });
         found
@@ -201,7 +202,7 @@ mod tests {
         let cells = two_outlines();
         let met = |line| {
             let mut met = Vec::new();
-            cells.any_along(line, |item| {
+            cells.any_under(line, |item| {
                 met.push(item);
                 false
             });
@@ -212,7 +213,7 @@ mod tests {
         assert_eq!(met([[0.0, 0.0], [8.0, 4.0]]), [0, 1]);
         assert_eq!(met([[8.0, 2.5], [3.0, 4.0]]), [] as [u32; 0]);
         let mut asked = 0;
-        assert!(cells.any_along([[0.0, 0.5], [8.0, 0.5]], |_| {
+        assert!(cells.any_under([[0.0, 0.5], [8.0, 0.5]], |_| {
             asked += 1;
             true
         }));
