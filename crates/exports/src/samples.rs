@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 use schedule::Workers;
 use store::{
     Area, Fingerprint, Manifest, Report, ReportBreach, ReportPerModule, ReportPerWindow, ReportPlace, ReportPoints,
-    ReportPool, ReportRefusals, ReportResidual, ReportStops, ReportVoids, TileModules, TileRecord,
+    ReportResidual, TileModules, TileRecord,
 };
 use terrain::{
     Canopy, Corner, Decks, GridFrame, HOLE_CLASS, LineForm, LineKind, LineStorey, LoadModule, ModuleGrid, ModuleId,
@@ -210,9 +210,7 @@ fn modules() -> Vec<LoadModule> {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
-        decks: Decks::default(),
-        lines: Vec::new(),
-        objects: terrain::Objects::default(),
+        ..LoadModule::default()
     };
     let east = LoadModule {
         id: ModuleId { row: 0, col: 1 },
@@ -228,9 +226,7 @@ fn modules() -> Vec<LoadModule> {
         classes: vec![1, 0, 0, 1],
         polygon_count: 4,
         residual: ModuleResidual { posts: 441, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
-        decks: Decks::default(),
-        lines: Vec::new(),
-        objects: terrain::Objects::default(),
+        ..LoadModule::default()
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]
@@ -252,36 +248,15 @@ pub(crate) fn report() -> Report {
     Report {
         area: "sample".into(),
         workers: 1,
-        stages: Vec::new(),
-        outdated: false,
-        tiles: Vec::new(),
-        files: BTreeMap::new(),
         points: ReportPoints { selected: 0, border: 0, corner: 6, total: 7 },
         count: "triangles".into(),
         triangles: 6,
         polygons: 6,
         per_load_module: ReportPerModule { mean: 3.0, mean_limit: 32.0, max: 4, limit: 3, over: 1 },
         per_4km: ReportPerWindow { max: 6, limit: 4096, over: 0, worst_9x9: 6 },
-        pool: ReportPool { size: 0, used: 0 },
-        before_removals: None,
         residual,
-        limit: None,
-        border: None,
-        heights: None,
-        residual_against_source_grid: None,
-        residual_against_source: None,
-        classes: Vec::new(),
-        features: None,
-        objects: None,
-        enough: None,
-        levels: vec![],
         overall_point_weighted_rms_m: 1.0,
-        dem_accuracy_m: None,
-        voids: ReportVoids { count: 0, filled: 0 },
         breaches: vec![breach],
-        refusals: ReportRefusals::default(),
-        bound: Vec::new(),
-        stops: ReportStops::default(),
-        warnings: Vec::new(),
+        ..Report::default()
     }
 }

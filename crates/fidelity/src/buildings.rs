@@ -47,7 +47,7 @@ fn holds(prism: &Prism, [x, y]: [f64; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, LineForm, LineTraits, ModuleId, ModuleResidual, ModuleVertex, Objects};
+    use terrain::{LineForm, LineTraits, ModuleId, ModuleVertex, Objects};
 
     use super::*;
 
@@ -71,14 +71,9 @@ mod tests {
             metres_in_buildings(&LoadModule {
                 id: ModuleId { row: 0, col: 0 },
                 side: 12_800,
-                vertices: Vec::new(),
-                triangles: Vec::new(),
-                classes: Vec::new(),
-                polygon_count: 0,
-                residual: ModuleResidual::default(),
-                decks: Decks::default(),
                 lines: vec![traits.line(0, vertices)],
                 objects: Objects { prisms: vec![prism], ..Objects::default() },
+                ..LoadModule::default()
             })
         };
         // 30 m across, less a courtyard of 10 m.

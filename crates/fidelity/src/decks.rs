@@ -324,7 +324,7 @@ fn samples(module: &LoadModule) -> Vec<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Decks, LineForm, LineKind, LineTraits, ModuleId, ModuleResidual};
+    use terrain::{Decks, LineForm, LineKind, LineTraits, ModuleId};
 
     fn vertex(x: u16, y: u16, z: i32) -> ModuleVertex {
         ModuleVertex { y, x, z }
@@ -362,10 +362,8 @@ mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
             classes: vec![0, 0, 1, 1],
             polygon_count: 4,
-            residual: ModuleResidual::default(),
             decks: Decks::of_triangles(triangles.to_vec()),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

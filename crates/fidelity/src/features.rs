@@ -357,7 +357,7 @@ fn is_within(a: LatticePoint, b: LatticePoint, at: LatticePoint, steps: i32) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Decks, Importance, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing, TileId};
+    use terrain::{Importance, ModuleGrid, ModuleId, ModuleVertex, Spacing, TileId};
 
     const STEPS: i32 = 16;
     const RECT: PostRect = PostRect { south: 0, west: 0, north: 8, east: 8 };
@@ -424,10 +424,7 @@ mod tests {
             classes: classes.to_vec(),
             id: ModuleId { row: 0, col: 0 },
             polygon_count: 2,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         };
         let mask = Importance::uniform(RECT, 1000);
         let dem = Dem::from_fn(RECT, |_| Some(0));

@@ -289,7 +289,7 @@ mod tests {
     use std::ops::Range;
 
     use fastrand::Rng;
-    use terrain::{Decks, ModuleId, ModuleVertex, Post};
+    use terrain::{ModuleId, ModuleVertex, Post};
 
     use super::*;
 
@@ -319,10 +319,7 @@ mod tests {
             classes: vec![0; triangles.len()],
             polygon_count: triangles.len() as u32,
             triangles,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

@@ -91,7 +91,7 @@ pub(crate) fn height_in([a, b, c]: [[f64; 3]; 3], [x, y]: [f64; 2]) -> Option<f6
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use terrain::{Decks, ModuleId, ModuleResidual, ModuleVertex};
+    use terrain::{ModuleId, ModuleVertex};
 
     /// A load module of 100 m at `col` on a plane that rises 1 m every 10 m to the east.
     pub(crate) fn ramp(col: u32) -> LoadModule {
@@ -103,10 +103,7 @@ pub(crate) mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2]],
             classes: vec![0, 0],
             polygon_count: 2,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

@@ -1,8 +1,6 @@
 //! Ground for tests: random TINs, load modules cut from them, and slow, obvious answers.
 
-use terrain::{
-    Decks, Dem, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Post, PostRect,
-};
+use terrain::{Dem, LatticePoint, LoadModule, ModuleGrid, ModuleId, ModuleVertex, Post, PostRect};
 use terrain::{Spacing, Tin, Vertex};
 
 use crate::sight::Draw;
@@ -90,10 +88,7 @@ pub fn module_of(tin: &Tin, id: ModuleId, spacing: Spacing) -> LoadModule {
         classes: vec![0; triangles.len()],
         polygon_count: triangles.len() as u32,
         triangles,
-        residual: ModuleResidual::default(),
-        decks: Decks::default(),
-        lines: Vec::new(),
-        objects: terrain::Objects::default(),
+        ..LoadModule::default()
     }
 }
 

@@ -92,7 +92,7 @@ impl Shares {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, Dem, Importance, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+    use terrain::{Dem, Importance, ModuleGrid, ModuleId, ModuleVertex, Spacing};
 
     use super::*;
 
@@ -107,10 +107,7 @@ mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2]],
             classes: vec![0; 2],
             polygon_count: 2,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

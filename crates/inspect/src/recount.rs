@@ -265,7 +265,7 @@ pub(crate) fn cracks_between(
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, ModuleVertex};
+    use terrain::ModuleVertex;
 
     use super::*;
 
@@ -303,10 +303,7 @@ mod tests {
             classes: vec![0; triangles.len()],
             polygon_count: 1,
             triangles,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

@@ -436,24 +436,13 @@ mod tests {
             polygons: 32,
             per_load_module: ReportPerModule { mean: 32.0, mean_limit: 32.0, max: 32, limit: 100, over: 0 },
             per_4km: ReportPerWindow { max: 4100, limit: 4096, over: 1, worst_9x9: 4200 },
-            pool: ReportPool::default(),
             before_removals: Some(ReportBefore { removed: 3, ..ReportBefore::default() }),
             residual: ReportResidual { rms_m: 1.1, max_m: 9.0, mean_abs_m: 0.7, p95_m: 2.0, p99_m: 3.3 },
             limit: Some(ReportLimit { triangles: 32, rms_m: 0.75, eta: Some(1.1 / 0.75), rough_share: 0.125 }),
-            border: None,
-            heights: None,
-            residual_against_source_grid: None,
-            residual_against_source: None,
-            classes: vec![],
-            features: None,
-            objects: None,
-            enough: None,
             levels: vec![ReportLevel { level: 1, inner_share: 0.5, triangles: 20, rms_m: 1.5, max_m: 11.25 }],
             overall_point_weighted_rms_m: 1.1,
             dem_accuracy_m: Some(2.5),
-            voids: ReportVoids::default(),
             breaches: vec![breach],
-            refusals: ReportRefusals::default(),
             bound: vec![ReportBound {
                 kind: "per_4km_square".into(),
                 place: ReportPlace::Window([2, 0]),
@@ -466,9 +455,9 @@ mod tests {
             }],
             stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
             warnings: vec!["one tile is frozen".into()],
-            outdated: false,
             tiles: vec![ReportTile { tile: [0, 1], seconds: BTreeMap::from([("refine".into(), 0.5)]) }],
             files: BTreeMap::from([("breaches.geojson".into(), FileStamp::of(b"{}"))]),
+            ..Report::default()
         }
     }
 

@@ -124,9 +124,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 400, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
-        decks: Decks::default(),
-        lines: Vec::new(),
-        objects: terrain::Objects::default(),
+        ..LoadModule::default()
     };
     let east = LoadModule {
         id: ModuleId { row: 2, col: 4 },
@@ -142,9 +140,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
         classes: vec![1, 0, 0, 1],
         polygon_count: 4,
         residual: ModuleResidual { posts: 399, largest: 128, sum_abs: 12_800, sum_squared: 1_638_400 },
-        decks: Decks::default(),
-        lines: Vec::new(),
-        objects: terrain::Objects::default(),
+        ..LoadModule::default()
     };
     [&west, &east].iter().for_each(|module| assert_eq!(module.check(), Ok(())));
     vec![west, east]

@@ -6,8 +6,8 @@ use crate::{Decks, ModuleId, ModuleLine, ModuleResidual, ModuleVertex, Objects, 
 /// One finished load module.
 ///
 /// Vertices are sorted by (y, x, z), triangles by their first corner, which is their smallest; so equal
-/// ground gives equal bytes. Triangles are counter-clockwise seen from above.
-#[derive(Clone, Debug, PartialEq)]
+/// ground gives equal bytes. Triangles are counter-clockwise seen from above. The default is empty, and not sound.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadModule {
     /// Which load module.
     pub id: ModuleId,
@@ -149,10 +149,7 @@ mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2]],
             classes: vec![0, 0],
             polygon_count: 2,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: Objects::default(),
+            ..LoadModule::default()
         }
     }
 

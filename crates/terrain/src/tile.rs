@@ -22,7 +22,7 @@ impl std::fmt::Display for TileId {
 }
 
 /// A load module by (row, column); 0,0 is the south-west one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ModuleId {
     /// Load modules north of the southernmost row.
     pub row: u32,

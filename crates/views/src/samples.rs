@@ -1,6 +1,6 @@
 //! A report with something in every part and a small piece of terrain, for the tests of this crate.
 
-use terrain::{Decks, GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, Spacing};
+use terrain::{GridFrame, LoadModule, ModuleGrid, ModuleId, ModuleVertex, Spacing};
 
 use crate::picture::{Scene, SceneLimits};
 use store::{
@@ -33,10 +33,7 @@ pub(crate) fn modules() -> Vec<LoadModule> {
             triangles: vec![[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
             classes: vec![0; 4],
             polygon_count: 4,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     };
     GRID.all().iter().map(module).collect()
@@ -115,10 +112,6 @@ pub(crate) fn report() -> Report {
         residual_against_source_grid: Some(residual(2.9)),
         residual_against_source: Some(residual(3.1)),
         classes: vec![class("plains", 2_587_215, 64_939, 0.869), class("mountains", 1_313_410, 28_532, 5.268)],
-        features: None,
-        objects: None,
-        enough: None,
-        levels: vec![],
         overall_point_weighted_rms_m: 2.999,
         dem_accuracy_m: Some(2.5),
         voids: ReportVoids { count: 12, filled: 12 },
@@ -135,9 +128,7 @@ pub(crate) fn report() -> Report {
         ],
         stops: ReportStops { budget_spent: 35, exhausted: 1, ..ReportStops::default() },
         warnings: vec!["tile r01c02 is frozen; a build makes it whole".into()],
-        outdated: false,
-        tiles: Vec::new(),
-        files: std::collections::BTreeMap::new(),
+        ..Report::default()
     }
 }
 

@@ -141,7 +141,7 @@ impl<'a> Around<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{ModuleResidual, Post, PostRect};
+    use terrain::{Post, PostRect};
 
     /// A load module of 4 x 4 cells of 8 m with one vertex 12 m east and 20 m north, over ground of 100 m with a step
     /// of 40 m at its eastern side.
@@ -151,14 +151,8 @@ mod tests {
         let module = LoadModule {
             id: ModuleId { row: 0, col: 0 },
             side: 32 * 128,
-            polygon_count: 0,
-            triangles: Vec::new(),
             vertices: vec![vertex, ModuleVertex { y: 0, x: 12 * 128, z: 0 }],
-            classes: Vec::new(),
-            residual: ModuleResidual::default(),
-            decks: terrain::Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         };
         let height = |post: Post| if post.col < 3 { 12_800 } else { 12_800 + 40 * 128 };
         let features = TileFeatures::none(terrain::TileId { row: 0, col: 0 });

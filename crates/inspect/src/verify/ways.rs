@@ -342,7 +342,7 @@ impl Along {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{Decks, ModuleId, ModuleResidual, Objects};
+    use terrain::{Decks, ModuleId};
 
     #[test]
     fn triangles_of_a_strip_leave_nothing_of_its_middle_line_bare() {
@@ -373,10 +373,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [3, 4, 5]],
             classes: vec![0; 2],
             polygon_count: 2,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: Objects::default(),
+            ..LoadModule::default()
         };
         let ground = Ground::of(&module, 1, 8.0);
         assert_eq!([(500, 996), (500, 990), (500, 1004)].map(|at| ground.off_m(at, 12_800)), [0.0, 100.0, 0.0]);
@@ -393,10 +390,8 @@ mod tests {
             triangles: vec![[0, 1, 2]],
             classes: vec![0],
             polygon_count: 1,
-            residual: ModuleResidual::default(),
             decks: Decks { vertices: corners(deck), triangles: vec![[0, 1, 2]], classes: vec![2] },
-            lines: Vec::new(),
-            objects: Objects::default(),
+            ..LoadModule::default()
         };
         let bare = |deck| Ground::of(&module(deck), 1, 8.0).bare([(1000, 3000), (1000, 5000)], [0, 64]).len();
         assert_eq!([bare(0), bare(128), bare(64 + 128), bare(900), bare(-128)], [0, 0, 1, 1, 1]);

@@ -34,9 +34,7 @@ fn flat(id: ModuleId) -> LoadModule {
         classes: vec![0, 1],
         polygon_count: 2,
         residual: ModuleResidual { posts: 441, largest: 300, sum_abs: 25_600, sum_squared: 3_276_800 },
-        decks: Decks::default(),
-        lines: Vec::new(),
-        objects: terrain::Objects::default(),
+        ..LoadModule::default()
     }
 }
 

@@ -63,7 +63,7 @@ fn most_common(facet: &Facet, posts: &PostGrid, mask: &Importance, offset: usize
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Decks, ModuleGrid, ModuleId, ModuleResidual, ModuleVertex, PostRect, Spacing};
+    use terrain::{ModuleGrid, ModuleId, ModuleVertex, PostRect, Spacing};
 
     use super::*;
 
@@ -81,10 +81,7 @@ mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2]],
             classes: vec![0, 0],
             polygon_count: 2,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         };
         let mask = Importance::new(PostRect::of_size(5, 5), vec![1000; 25], classes.concat());
         assert_eq!(of_triangles(&module, &layout, &mask, None), expected);

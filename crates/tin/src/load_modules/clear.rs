@@ -194,7 +194,7 @@ fn split(soup: &mut Soup, vertex: ModuleVertex, triangles: &[usize]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{ModuleId, ModuleResidual};
+    use terrain::ModuleId;
 
     const SIDE: u16 = 12_800;
     const ROAD: u8 = 3;
@@ -218,10 +218,7 @@ mod tests {
             triangles,
             classes,
             polygon_count: 4,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

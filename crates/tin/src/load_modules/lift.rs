@@ -472,7 +472,7 @@ pub(super) fn cross(from: [f64; 2], to: [f64; 2], at: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleId, ModuleResidual, check_decks};
+    use terrain::{LineForm, LineKind, LineStorey, LineTraits, ModuleId, check_decks};
 
     const SIDE: u16 = 12_800;
 
@@ -492,10 +492,7 @@ mod tests {
             triangles: vec![[0, 1, 3], [0, 3, 2], [1, 5, 3], [2, 3, 4], [3, 5, 4]],
             classes: vec![0; 5],
             polygon_count: 5,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         }
     }
 

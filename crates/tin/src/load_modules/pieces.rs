@@ -9,7 +9,7 @@
 //! the square stays covered once, and only the coplanarity of that load module's pieces is given up.
 
 use terrain::limits::{polygons_of, triangles_of};
-use terrain::{Decks, Importance, LoadModule, ModuleId, ModuleResidual, ModuleVertex, Post};
+use terrain::{Importance, LoadModule, ModuleId, ModuleVertex, Post};
 
 use crate::load_modules::{Faces, Layout, classes};
 
@@ -84,12 +84,7 @@ impl Pieces {
             side: layout.side(),
             vertices: corners.iter().map(|corner| corner.vertex()).collect(),
             triangles: Vec::with_capacity(self.ends.len()),
-            classes: Vec::new(),
-            polygon_count: 0,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: terrain::Objects::default(),
+            ..LoadModule::default()
         };
         let sides = self.fan(&corners, &mut module).unwrap_or_else(|| triangulate_afresh(&mut module));
         module.triangles.sort_unstable();

@@ -149,7 +149,7 @@ fn crossing([a, b]: [[f64; 3]; 2], [c, d]: [[f64; 2]; 2]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use terrain::{Corner, Decks, ModuleResidual, ModuleVertex, ObjectKind};
+    use terrain::{Corner, ModuleVertex, ObjectKind};
 
     use super::*;
 
@@ -167,10 +167,7 @@ mod tests {
             triangles: vec![[0, 1, 2], [0, 2, 3], [1, 4, 2], [2, 4, 3]],
             classes: vec![0; 4],
             polygon_count: 4,
-            residual: ModuleResidual::default(),
-            decks: Decks::default(),
-            lines: Vec::new(),
-            objects: Objects::default(),
+            ..LoadModule::default()
         }
     }
 
