@@ -19,10 +19,12 @@ mod key {
     pub const CITATION: u16 = 1026;
     pub const GEOGRAPHIC_TYPE: u16 = 2048;
     pub const DATUM: u16 = 2050;
+    pub const PRIME_MERIDIAN: u16 = 2051;
     pub const ANGULAR_UNITS: u16 = 2054;
     pub const ELLIPSOID: u16 = 2056;
     pub const SEMI_MAJOR: u16 = 2057;
     pub const INVERSE_FLATTENING: u16 = 2059;
+    pub const PRIME_MERIDIAN_DEGREES: u16 = 2061;
     pub const TO_WGS84: u16 = 2062;
     pub const PROJECTED_TYPE: u16 = 3072;
     pub const PROJECTION: u16 = 3074;
@@ -94,7 +96,10 @@ impl GeoKeys {
             ));
         }
         match self.short(key::GEOGRAPHIC_TYPE) {
-            None | Some(0 | USER_DEFINED) => Parameters::geographic(self.datum()?).crs(""),
+            None | Some(0 | USER_DEFINED) => {
+                let prime_meridian = self.prime_meridian()?;
+                Parameters { prime_meridian, ..Parameters::geographic(self.datum()?) }.crs("")
+            }
             Some(code) => Crs::from_epsg(code.into()),
         }
     }
@@ -120,6 +125,16 @@ impl GeoKeys {
                 unit_m.map(Some).ok_or_else(|| "in a unit of the file's own without a size".into())
             }
             Some(code) => Err(format!("in units of code {code}")),
+        }
+    }
+
+    /// Degrees east of Greenwich from which longitudes count.
+    fn prime_meridian(&self) -> Result<f64, String> {
+        const GREENWICH: u16 = 8901;
+        match (self.short(key::PRIME_MERIDIAN), self.double(key::PRIME_MERIDIAN_DEGREES)) {
+            (None | Some(0 | GREENWICH), None) => Ok(0.0),
+            (_, Some(degrees)) => Ok(degrees),
+            (Some(code), None) => Err(format!("defined by the file, counted from the meridian of code {code}")),
         }
     }
 
@@ -180,6 +195,7 @@ impl GeoKeys {
             false_east_m: self.first_of(&key::FALSE_EAST).unwrap_or(0.0) * unit_m,
             false_north_m: self.first_of(&key::FALSE_NORTH).unwrap_or(0.0) * unit_m,
             unit_m,
+            prime_meridian: self.prime_meridian()?,
             ..Parameters::geographic(datum)
         }
         .crs(name)
@@ -194,6 +210,7 @@ impl GeoKeys {
             false_east_m: 500_000.0,
             false_north_m: if south { 1.0e7 } else { 0.0 },
             unit_m: self.unit_m()?.unwrap_or(1.0),
+            prime_meridian: self.prime_meridian()?,
             ..Parameters::geographic(self.datum()?)
         })
     }

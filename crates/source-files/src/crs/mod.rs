@@ -10,6 +10,7 @@ pub(crate) mod datums;
 pub use datums::{plain_datum, vertical_code};
 mod geokeys;
 mod parameters;
+mod shifts;
 pub(crate) mod vertical;
 mod wkt;
 use datums::datum_of_system;
@@ -56,6 +57,23 @@ impl Crs {
     /// In words, what is wrong with it.
     pub(crate) fn from_wkt(text: &str) -> Result<Self, String> {
         wkt::read(text)
+    }
+
+    /// The same with heights above another datum: those of a vertical system by its EPSG code, or by its name and the
+    /// unit that is spelled out.
+    ///
+    /// # Errors
+    /// In words, what is wrong with it.
+    #[cfg(feature = "geoparquet")]
+    pub(crate) fn with_heights(self, code: Option<u32>, name: &str, unit_m: Option<f64>) -> Result<Self, String> {
+        let of_code = code.and_then(|code| u16::try_from(code).ok()).map(vertical::unit_m);
+        let unit_m = match (of_code, unit_m.filter(|unit_m| (1.0e-6..=1.0e6).contains(unit_m))) {
+            (Some(Ok(unit_m)), _) | (_, Some(unit_m)) => unit_m,
+            (Some(Err(found)), None) => return Err(found),
+            (None, None) => return Err("one whose vertical part has no unit".into()),
+        };
+        let datum = code.map_or_else(|| datums::datum_in_name(name), datum_of_system);
+        Ok(self.with_vertical(Vertical { unit_m, datum }))
     }
 
     /// The system that `text` names: `EPSG:32611`, or well-known text.

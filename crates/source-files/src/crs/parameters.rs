@@ -34,6 +34,8 @@ pub(super) enum Datum {
 pub(super) struct Parameters {
     pub method: Method,
     pub datum: Datum,
+    /// Longitudes count from here, east of Greenwich.
+    pub prime_meridian: f64,
     pub latitude_of_origin: f64,
     pub central_meridian: f64,
     pub first_parallel: Option<f64>,
@@ -50,6 +52,7 @@ impl Parameters {
         Self {
             method: Method::Geographic,
             datum,
+            prime_meridian: 0.0,
             latitude_of_origin: 0.0,
             central_meridian: 0.0,
             first_parallel: None,
@@ -67,11 +70,15 @@ impl Parameters {
             return Crs::horizontal(code);
         }
         let name = if name.is_empty() { "a system of its own".to_owned() } else { name.to_owned() };
-        Crs::new(format!("{} {}", self.projection(), self.ellipsoid()), name, None)
+        let meridian = if self.prime_meridian == 0.0 { String::new() } else { format!(" +pm={}", self.prime_meridian) };
+        Crs::new(format!("{} {}{meridian}", self.projection(), self.ellipsoid()), name, None)
     }
 
     /// The EPSG code of the plainest systems: degrees, and UTM.
     fn code(&self) -> Option<u32> {
+        if self.prime_meridian != 0.0 {
+            return None;
+        }
         if self.method == Method::Geographic {
             return match self.datum {
                 Datum::Wgs84 => Some(4326),

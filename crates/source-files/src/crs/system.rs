@@ -4,6 +4,7 @@ use proj4rs::Proj;
 use proj4rs::transform::transform;
 
 use super::datums::datum_of_system;
+use super::{shifts, wkt};
 
 /// A coordinate reference system with everything needed to compute with it.
 #[derive(Clone)]
@@ -16,6 +17,9 @@ pub struct Crs {
     vertical: Option<Vertical>,
     /// What heights of a system of three dimensions are above.
     ellipsoidal: Option<String>,
+    /// Degrees east of Greenwich from which its longitudes count; 0 for a projected system, in which the library adds
+    /// them.
+    meridian: f64,
     proj: Proj,
 }
 
@@ -54,6 +58,23 @@ const SHIFTED: [&str; 7] = [
     "+datum=OSGB36",
 ];
 
+/// Meridians that PROJ's definitions name, in degrees east of Greenwich, as the EPSG registry has them.
+const MERIDIANS: [(&str, f64); 13] = [
+    ("lisbon", -9.131_906_111_111),
+    ("paris", 2.337_229_166_667),
+    ("bogota", -74.080_916_666_667),
+    ("madrid", -3.687_938_888_889),
+    ("rome", 12.452_333_333_333),
+    ("bern", 7.439_583_333_333),
+    ("jakarta", 106.807_719_444_444),
+    ("ferro", -17.666_666_666_667),
+    ("brussels", 4.367_975),
+    ("stockholm", 18.058_277_777_778),
+    ("athens", 23.716_337_5),
+    ("oslo", 10.722_916_666_667),
+    ("copenhagen", 12.577_88),
+];
+
 impl Crs {
     /// Longitude and latitude in degrees on WGS 84.
     pub fn wgs84() -> Self {
@@ -79,7 +100,14 @@ impl Crs {
         let definition = known.proj4.replace(" +nadgrids=@null", "").replace(" +wktext", "");
         // The library knows the scale by this name only.
         let definition = definition.replace("+k_0=", "+k=");
-        let crs = Self::new(definition, format!("EPSG:{code}"), Some(code))?;
+        if known.wkt.starts_with("GEOGCS") && known.wkt.contains("UNIT[\"grad\"") {
+            return Err(format!(
+                "EPSG:{code}, whose angles are grads; bring it to degrees: gdalwarp or ogr2ogr -t_srs"
+            ));
+        }
+        let geographic = wkt::geographic_code(known.wkt);
+        let mut crs = Self::new(shifts::corrected(definition, code, geographic)?, format!("EPSG:{code}"), Some(code))?;
+        crs.remark = crs.remark.map(|_| shifts::remark(geographic));
         let is_three_dimensional = known.wkt.contains("CS[ellipsoidal,3]");
         Ok(Self { ellipsoidal: is_three_dimensional.then(|| datum_of_system(code)).flatten(), ..crs })
     }
@@ -88,7 +116,8 @@ impl Crs {
     pub(super) fn new(definition: String, name: String, epsg: Option<u32>) -> Result<Self, String> {
         let definition = with_known_datum(&definition)?;
         let remark = remark(&definition);
-        let proj = Proj::from_proj_string(&definition).map_err(|error| {
+        let (computed, meridian) = counted_from(&definition)?;
+        let proj = Proj::from_proj_string(&computed).map_err(|error| {
             let projection = definition.split_whitespace().find_map(|word| word.strip_prefix("+proj="));
             format!("projection {} ({error})", projection.unwrap_or("without a name"))
         })?;
@@ -98,7 +127,8 @@ impl Crs {
         if !proj.is_normalized_axis() {
             return Err("a system whose axes do not run east and north".into());
         }
-        Ok(Self { epsg, name, definition, remark, vertical: None, ellipsoidal: None, proj })
+        let meridian = if proj.is_latlong() { meridian } else { 0.0 };
+        Ok(Self { epsg, name, definition, remark, vertical: None, ellipsoidal: None, meridian, proj })
     }
 
     /// The same with heights, as a compound system says.
@@ -148,10 +178,11 @@ impl Crs {
             return Some([x, y]);
         }
         let [x, y] = self.refined([x, y]);
-        let mut place = if self.is_geographic() { (x.to_radians(), y.to_radians(), 0.0) } else { (x, y, 0.0) };
+        let longitude = x + self.meridian;
+        let mut place = if self.is_geographic() { (longitude.to_radians(), y.to_radians(), 0.0) } else { (x, y, 0.0) };
         transform(&self.proj, &other.proj, &mut place).ok()?;
         let (x, y, _) = place;
-        let [x, y] = if other.is_geographic() { [x.to_degrees(), y.to_degrees()] } else { [x, y] };
+        let [x, y] = if other.is_geographic() { [x.to_degrees() - other.meridian, y.to_degrees()] } else { [x, y] };
         (x.is_finite() && y.is_finite()).then_some([x, y])
     }
 
@@ -223,9 +254,39 @@ fn with_known_datum(definition: &str) -> Result<String, String> {
     Err("on a datum without a known shift to WGS 84".into())
 }
 
+fn word_of<'a>(definition: &'a str, key: &str) -> Option<&'a str> {
+    definition.split_whitespace().find_map(|word| word.strip_prefix(key))
+}
+
+/// A definition with the flattening of its ellipsoid where it has both axes instead: the library takes that for the
+/// part of the lesser axis, not of the greater, with which transverse Mercator is tens of metres off.
+fn with_flattening(definition: &str) -> String {
+    let is = |words: [&str; 2]| words.iter().any(|word| definition.split_whitespace().any(|other| other == *word));
+    let axis = |key: &str| word_of(definition, key).and_then(|axis| axis.parse::<f64>().ok());
+    let inverse = match (axis("+a="), axis("+b=")) {
+        (Some(greater), Some(lesser)) if lesser < greater => greater / (greater - lesser),
+        _ if is(["+ellps=clrk66", "+datum=NAD27"]) => 294.978_698_213_898_2,
+        _ if is(["+ellps=mod_airy", "+datum=ire65"]) => 299.324_964_6,
+        _ => return definition.to_owned(),
+    };
+    format!("{definition} +rf={inverse}")
+}
+
+/// A definition as the library is to have it, and the degrees east of Greenwich from which its longitudes count. The
+/// library takes a meridian for radians, also where it knows its degrees by a name; and it leaves it out where nothing
+/// is projected.
+fn counted_from(definition: &str) -> Result<(String, f64), String> {
+    let definition = with_flattening(definition);
+    let Some(stated) = word_of(&definition, "+pm=") else { return Ok((definition, 0.0)) };
+    let named = MERIDIANS.iter().find(|(name, _)| *name == stated).map(|(_, degrees)| *degrees);
+    let degrees = named.or_else(|| stated.parse().ok()).filter(|degrees: &f64| degrees.abs() <= 180.0);
+    let degrees = degrees.ok_or_else(|| format!("counted from the meridian {stated}, which is not known"))?;
+    Ok((definition.replace(&format!("+pm={stated}"), &format!("+pm={}", degrees.to_radians())), degrees))
+}
+
 fn remark(definition: &str) -> Option<String> {
     let shift = definition.split_whitespace().find_map(|word| word.strip_prefix("+towgs84="));
-    let shifts = shift.is_some_and(|shift| shift.split(',').any(|number| number.parse() != Ok(0.0)));
+    let is_shifted = shift.is_some_and(|shift| shift.split(',').any(|number| number.parse() != Ok(0.0)));
     let named = SHIFTED.iter().any(|datum| definition.contains(datum));
-    (shifts || named).then(|| "its datum is shifted to WGS 84 by a few parameters, good to some metres".to_owned())
+    (is_shifted || named).then(|| shifts::remark(None))
 }

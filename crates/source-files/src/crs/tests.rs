@@ -86,7 +86,8 @@ fn what_cannot_be_computed_is_refused_by_name() {
     assert!(refused("EPSG:99999").contains("not in the table"));
     assert!(refused("EPSG:x").contains("without a number"));
     assert!(refused(&DEGREES.replace("D_WGS_1984", "D_Mars_2000")).contains("D_Mars_2000"));
-    assert!(refused(&DEGREES.replace("Greenwich\",0.0", "Paris\",2.337")).contains("meridian 2.337"));
+    assert!(refused("EPSG:4807").contains("grads"));
+    assert!(refused("EPSG:6984").contains("without a known shift"));
     for text in ["", "nonsense", "GEOGCS[", "GEOGCS[\"x", "GEOGCS[\"x\",", &"A[".repeat(1000), "LOCAL_CS[\"x\"]"] {
         assert!(!refused(text).is_empty(), "{text}");
     }
@@ -126,4 +127,81 @@ fn a_compound_system_says_what_heights_are_measured_from() {
     assert_eq!(found(&compound(by_its_datum)), metres("NAVD88"));
     let by_name = r#"VERTCS["EGM96_Geoid",VDATUM["EGM96_Geoid"],UNIT["Meter",1.0]]"#;
     assert_eq!(found(&format!("{DEGREES},{by_name}")), metres("EGM96"), "ESRI's writers put it behind");
+}
+
+/// Places in systems that count longitudes from elsewhere: WGS 84 longitude and latitude, and where PROJ puts them.
+#[test]
+fn longitudes_count_from_the_meridian_of_the_system() {
+    for (code, place, lon_lat) in [
+        (27_561, [552_587.5956, 215_784.1946], [1.68, 49.64]),
+        (27_572, [549_826.6307, 2_192_990.7122], [1.68, 46.735]),
+        (31_251, [26_674.9546, 227_959.9126], [10.685, 47.19]),
+        (27_391, [-13_265.9063, 283_443.6428], [5.81, 60.545]),
+        (21_780, [60_013.5437, -14_828.0183], [8.225, 46.815]),
+        (5329, [4_655_117.8505, 902_715.2094], [116.805, 0.025]),
+        (5330, [3_396_557.7183, 737_974.8396], [105.465, -1.47]),
+        (5331, [4_981_176.1526, 435_309.4635], [119.745, -4.21]),
+        (4801, [0.7865, 46.8163], [8.225, 46.815]),
+        (4803, [1.2581, 39.5534], [-7.875, 39.555]),
+        (4813, [-1.3444, -1.4697], [105.465, -1.47]),
+        (4805, [33.9527, 44.9351], [16.285, 44.935]),
+        (4818, [34.9931, 49.3956], [17.325, 49.395]),
+    ] {
+        let crs = Crs::from_epsg(code).unwrap();
+        let found = crs.to(&Crs::wgs84(), place).unwrap();
+        // Of some datums PROJ knows other parameters, too.
+        assert!((0..2).all(|axis| (found[axis] - lon_lat[axis]).abs() < 1.0e-4), "{code}: {found:?}");
+        let back = Crs::wgs84().to(&crs, found).unwrap();
+        let unit_m = crs.unit_m().unwrap_or(111_319.0);
+        assert!(
+            (0..2).all(|axis| (back[axis] - place[axis]).abs() * unit_m < 1.0e-2),
+            "{code} there and back: {back:?}"
+        );
+    }
+    let shifted = "DATUM[\"x\",SPHEROID[\"x\",6378249.2,293.4660212936269],TOWGS84[-168,-60,320,0,0,0,0]]";
+    let paris = format!("GEOGCS[\"x\",{shifted},PRIMEM[\"Paris\",2.33722917],UNIT[\"degree\",0.0174532925199433]]");
+    let lambert = format!(
+        "PROJCS[\"x\",{paris},PROJECTION[\"Lambert_Conformal_Conic_1SP\"],PARAMETER[\"latitude_of_origin\",46.8],\
+        PARAMETER[\"central_meridian\",0],PARAMETER[\"scale_factor\",0.99987742],PARAMETER[\"false_easting\",600000],\
+        PARAMETER[\"false_northing\",2200000],UNIT[\"metre\",1]]"
+    );
+    let by_code = Crs::from_epsg(27_572).unwrap().to(&Crs::wgs84(), [6.0e5, 2.3e6]).unwrap();
+    let spelled_out = Crs::from_wkt(&lambert).unwrap().to(&Crs::wgs84(), [6.0e5, 2.3e6]).unwrap();
+    assert!((0..2).all(|axis| (by_code[axis] - spelled_out[axis]).abs() < 1.0e-6), "{by_code:?} {spelled_out:?}");
+    let degrees = Crs::from_wkt(&paris).unwrap().to(&Crs::wgs84(), [0.0, 47.7]).unwrap();
+    assert!((degrees[0] - by_code[0]).abs() < 1.0e-6, "{degrees:?} {by_code:?}");
+}
+
+/// Transverse Mercator on ellipsoids that are known by both axes, and shifts that the table of systems has wrong.
+#[test]
+fn old_datums_lie_where_proj_puts_them() {
+    for (code, lon_lat, expected) in [
+        (3121, [117.02, 12.425], [502_020.6818, 1_374_106.4305]),
+        (3920, [-64.565, 18.53], [334_769.1158, 2_049_638.2118]),
+        (3769, [-64.75, 32.3], [335_200.2552, 3_574_689.6419]),
+        (2987, [-56.2, 46.9], [560_693.0515, 5_193_871.0764]),
+        (3303, [-138.65, -10.5], [757_397.7673, 8_838_225.6264]),
+        (6991, [35.2, 31.8], [219_035.7897, 634_141.1394]),
+        (2039, [35.2, 31.8], [219_035.7900, 634_141.1396]),
+        (3844, [26.1, 44.4], [587_745.8479, 322_843.9653]),
+        (29_902, [-8.0, 53.0], [200_049.3149, 194_328.9887]),
+    ] {
+        let found = Crs::wgs84().to(&Crs::from_epsg(code).unwrap(), lon_lat).unwrap();
+        let off_m = (found[0] - expected[0]).hypot(found[1] - expected[1]);
+        assert!(off_m < 2.0, "{code}: {found:?}, {off_m} m off");
+    }
+    let remark = |code: u32| Crs::from_epsg(code).unwrap().remark().unwrap_or_default().to_owned();
+    assert!(remark(2987).ends_with("good to some metres") && remark(24_305).ends_with("off by up to 95 m"));
+    assert!(remark(24_311).contains("not known") && remark(6991).contains("is shifted"));
+}
+
+#[test]
+fn web_mercator_is_known_in_the_words_of_its_makers() {
+    let text = |parallel: f64| {
+        let words = [("False_Easting", 0.0), ("Standard_Parallel_1", parallel), ("Auxiliary_Sphere_Type", 0.0)];
+        let words: String = words.iter().map(|(name, value)| format!("PARAMETER[\"{name}\",{value}],")).collect();
+        format!("PROJCS[\"x\",{DEGREES},PROJECTION[\"Mercator_Auxiliary_Sphere\"],{words}UNIT[\"Meter\",1.0]]")
+    };
+    assert_eq!(Crs::from_wkt(&text(0.0)).unwrap().epsg(), Some(3857));
+    assert!(Crs::from_wkt(&text(10.0)).unwrap_err().contains("Mercator_Auxiliary_Sphere"));
 }

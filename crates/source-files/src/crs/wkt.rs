@@ -39,6 +39,13 @@ pub(super) fn read(text: &str) -> Result<Crs, String> {
     })
 }
 
+/// The EPSG code of the geographic system that a text describes, or that the system is projected from.
+pub(super) fn geographic_code(text: &str) -> Option<u32> {
+    let mut parser = Parser { rest: text, depth: 0 };
+    let root = parser.node().ok()?;
+    if root.keyword == "GEOGCS" { root.code() } else { root.child("GEOGCS")?.code() }
+}
+
 /// Unit and datum of a vertical system.
 fn heights(vertical: &Node) -> Result<Vertical, String> {
     let datum_node = ["VERT_DATUM", "VDATUM", "VERTICALDATUM"].iter().find_map(|keyword| vertical.child(keyword));
@@ -72,13 +79,32 @@ fn system(root: &Node) -> Result<Crs, String> {
     }
     let name = root.texts.first().map_or("", String::as_str);
     match root.keyword.as_str() {
-        "GEOGCS" => Parameters::geographic(datum(root)?).crs(name),
+        "GEOGCS" => {
+            Parameters { prime_meridian: prime_meridian(root), ..Parameters::geographic(datum(root)?) }.crs(name)
+        }
+        "PROJCS" if is_web_mercator(root) => Crs::horizontal(3857),
         "PROJCS" => projected(root)?.crs(name),
         "BOUNDCRS" => system(root.children.first().ok_or("a compound system without parts")?),
         "PROJCRS" | "GEOGCRS" | "GEODCRS" => Err(format!("version 2 of well-known text without a code ({name})")),
         "LOCAL_CS" | "ENGCRS" => Err(format!("a local system ({name})")),
         other => Err(format!("a system of kind {other}")),
     }
+}
+
+/// Whether it is Web Mercator as ESRI's writers spell it out: on a sphere, of places on the ellipsoid of WGS 84.
+fn is_web_mercator(root: &Node) -> bool {
+    let is_of = |keyword: &str, name: &str| {
+        let of = root.child(keyword).and_then(|node| node.texts.first());
+        of.is_some_and(|of| of.eq_ignore_ascii_case(name))
+    };
+    let parameters = root.children.iter().filter(|node| node.keyword == "PARAMETER");
+    let mut numbers = parameters.filter_map(|node| node.numbers.first());
+    let datum = root.child("GEOGCS").and_then(|geographic| datum(geographic).ok());
+    is_of("PROJECTION", "Mercator_Auxiliary_Sphere")
+        && datum == Some(Datum::Wgs84)
+        && root.child("GEOGCS").is_some_and(|geographic| prime_meridian(geographic) == 0.0)
+        && root.child("UNIT").and_then(|unit| unit.numbers.first()) == Some(&1.0)
+        && numbers.all(|number| *number == 0.0)
 }
 
 fn projected(root: &Node) -> Result<Parameters, String> {
@@ -101,6 +127,7 @@ fn projected(root: &Node) -> Result<Parameters, String> {
     Ok(Parameters {
         method: method_named(method)?,
         datum: datum(geographic)?,
+        prime_meridian: prime_meridian(geographic),
         latitude_of_origin: angle(&["latitude_of_origin", "latitude_of_center"])
             .or_else(|| angle(&["standard_parallel_1"]))
             .unwrap_or(0.0),
@@ -134,12 +161,12 @@ fn angle_unit(geographic: &Node) -> Result<f64, String> {
     if (degrees - 1.0).abs() < 1.0e-9 { Ok(1.0) } else { Err(format!("angles in units of {degrees} degrees")) }
 }
 
+/// Degrees east of Greenwich, whatever the unit of other angles.
+fn prime_meridian(geographic: &Node) -> f64 {
+    geographic.child("PRIMEM").and_then(|node| node.numbers.first().copied()).unwrap_or(0.0)
+}
+
 fn datum(geographic: &Node) -> Result<Datum, String> {
-    if let Some(longitude) = geographic.child("PRIMEM").and_then(|node| node.numbers.first())
-        && *longitude != 0.0
-    {
-        return Err(format!("counted from the meridian {longitude}"));
-    }
     angle_unit(geographic)?;
     let node = geographic.child("DATUM").ok_or("no datum named")?;
     let name = node.texts.first().map_or("", String::as_str);
