@@ -88,6 +88,9 @@ pub enum SourceError {
     /// Voids are marked by a raster of their own.
     #[error("{path}: voids are given by an internal mask, expected a nodata tag")]
     InternalMask { path: PathBuf },
+    /// A file beside the raster says something of its heights that the raster itself does not.
+    #[error("{path}: {found}, expected all that changes heights in the file itself")]
+    SideFile { path: PathBuf, found: String },
     /// The file begins with something else than its raster.
     #[error("{path}: the first directory is an overview or a mask, expected the full raster")]
     NotFullRaster { path: PathBuf },
@@ -237,6 +240,10 @@ impl SourceError {
             Bands { path, .. } => ("choose the band of heights: gdal_translate -b 1", path),
             Photometric { path, .. } => ("rewrite it: gdal_translate -co PHOTOMETRIC=MINISBLACK", path),
             InternalMask { path } => ("write the mask into the heights: gdalwarp -dstnodata -9999", path),
+            SideFile { path, found } if found.contains("mask") => {
+                ("write the mask into the heights: gdalwarp -dstnodata -9999", path)
+            }
+            SideFile { path, .. } => ("write it into the file: gdal_translate", path),
             NotFullRaster { path } | TiffFeature { path, .. } => ("rewrite it: gdal_translate", path),
             Geographic { path, .. } => ("project it, to your own zone: gdalwarp -t_srs EPSG:32611 -r bilinear", path),
             NoPosition { path } | ControlPoints { path, .. } | Rotated { path, .. } => {
@@ -266,9 +273,15 @@ impl SourceError {
                 }
                 found if has(found, &["an empty file"]) => "the file was not copied or unpacked whole; fetch it again",
                 found if has(found, &["archive", "gzip", "bzip2 file"]) => "unpack it and name the file in it",
+                found if has(found, &["encoded as"]) => {
+                    "write them as well-known binary: ogr2ogr -lco GEOMETRY_ENCODING=WKB out.parquet in.parquet"
+                }
                 found if has(found, &["Shapefile"]) => "name the .shp; the others are found beside it",
                 _ => "name a file of lines or polygons; ogr2ogr makes a GeoPackage of most others",
             },
+            Layer { found, .. } if has(found, &["no table", "computed"]) => {
+                "make a plain table of it: ogr2ogr out.gpkg in.gpkg LAYER"
+            }
             Layer { .. } => "name a layer: sources = [{ file = \"…\", layer = \"…\" }]; ogrinfo lists them",
             FeatureCrs { .. } => "say what it is: features.sources = [{ file = \"…\", crs = \"EPSG:…\" }]",
             NoOtherCrs { .. } => "remove crs",
@@ -299,6 +312,9 @@ impl SourceError {
             NotAFile { .. } => "it cannot be read twice: copy what it gives into a file",
             Empty { .. } => "the file was not copied or unpacked whole; fetch it again",
             Changed { .. } => "leave sources alone during a build; run the same command again",
+            Malformed { what, .. } if what.contains("nodata") => {
+                "give it a number: gdal_translate -a_nodata -9999 in.… out.tif"
+            }
             Read { .. } | Truncated { .. } | Malformed { .. } | BrokenChunk { .. } => {
                 "the file is damaged or was not copied whole; fetch it again; what `tiefort fetch` brought \
                  comes anew with --update"

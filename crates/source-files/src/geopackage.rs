@@ -16,6 +16,7 @@ use rusqlite::{Connection, OpenFlags, OptionalExtension, Row};
 use crate::SourceError;
 use crate::crs::Crs;
 use crate::error::at_most;
+use crate::features::curves::Chords;
 use crate::features::raw::RawShape;
 use crate::features::well_known::geometry;
 use crate::limits::{LAYERS_MAX, ROWS_MAX};
@@ -25,7 +26,12 @@ pub(crate) const MARK: &[u8] = b"SQLite format 3\0";
 
 /// The names of the layers of the GeoPackage at `path`.
 pub(crate) fn layer_names(path: &Path) -> Result<Vec<String>, SourceError> {
-    Ok(Package::open(path)?.tables()?.into_iter().map(|table| table.name).collect())
+    let package = Package::open(path)?;
+    let (tables, unread) = package.tables()?;
+    match unread.first().filter(|_| tables.is_empty()) {
+        Some(unread) => Err(unread.refused(path)),
+        None => Ok(tables.into_iter().map(|table| table.name).collect()),
+    }
 }
 
 /// A table of features, its column of geometries and their system.
@@ -33,6 +39,24 @@ pub(crate) struct Table {
     pub name: String,
     pub column: String,
     pub srs: i64,
+}
+
+/// A layer that is not read, for it is or holds a program.
+pub(crate) struct Unread {
+    pub name: String,
+    /// What it is.
+    pub found: String,
+}
+
+impl Unread {
+    /// The error of having nothing else to read.
+    pub(crate) fn refused(&self, path: &Path) -> SourceError {
+        SourceError::Layer {
+            path: path.into(),
+            found: self.found.clone(),
+            expected: "a plain table with columns of values".into(),
+        }
+    }
 }
 
 /// A column of a table of features.
@@ -77,30 +101,34 @@ impl<'a> Package<'a> {
         // A virtual table has no page of its own to begin on.
         let plain = "SELECT 1 FROM sqlite_schema WHERE type = 'table' AND rootpage > 0 AND lower(name) = lower(?1)";
         let found = self.database.query_row(plain, [name], |_| Ok(())).optional();
-        let is_table = found.map(|found| found.is_some()).map_err(|error| self.broken(error))?;
-        if is_table {
-            self.stores_all_columns(name)?;
+        found.map(|found| found.is_some()).map_err(|error| self.broken(error))
+    }
+
+    /// Whether there is a table to take values from.
+    fn is_plain_table(&self, name: &str) -> Result<bool, SourceError> {
+        if !self.is_table(name)? {
+            return Ok(false);
         }
-        Ok(is_table)
+        match self.computed_column(name)? {
+            None => Ok(true),
+            Some(found) => Err(self.malformed(found, "columns of values")),
+        }
     }
 
     /// A column that is computed is a program: it may make gigabytes of nothing.
-    fn stores_all_columns(&self, name: &str) -> Result<(), SourceError> {
+    fn computed_column(&self, name: &str) -> Result<Option<String>, SourceError> {
         let computed = "SELECT CAST(name AS BLOB) FROM pragma_table_xinfo(?1) WHERE hidden <> 0";
         let found = self.database.query_row(computed, [name], |row| row.get::<_, Vec<u8>>(0)).optional();
-        match found.map_err(|error| self.broken(error))? {
-            None => Ok(()),
-            Some(column) => {
-                let column = String::from_utf8_lossy(&column).into_owned();
-                Err(self.malformed(format!("a column `{column}` of `{name}` that is computed"), "columns of values"))
-            }
-        }
+        let found = found.map_err(|error| self.broken(error))?;
+        let told =
+            |column: Vec<u8>| format!("a column `{}` of `{name}` that is computed", String::from_utf8_lossy(&column));
+        Ok(found.map(told))
     }
 
-    /// Its tables of features.
-    pub(crate) fn tables(&self) -> Result<Vec<Table>, SourceError> {
+    /// Its tables of features, and the layers that are none.
+    pub(crate) fn tables(&self) -> Result<(Vec<Table>, Vec<Unread>), SourceError> {
         const LIST: &str = "gpkg_geometry_columns";
-        if !self.is_table(LIST)? {
+        if !self.is_plain_table(LIST)? {
             return Err(self.malformed("a database without layers".into(), "a GeoPackage with a layer of features"));
         }
         let query = format!("SELECT table_name, column_name, srs_id FROM {LIST} LIMIT {}", LAYERS_MAX + 1);
@@ -110,18 +138,25 @@ impl<'a> Package<'a> {
         let tables: Result<Vec<Table>, _> = rows.map_err(|error| self.broken(error))?.collect();
         let tables = tables.map_err(|error| self.broken(error))?;
         at_most(self.path, tables.len() as u64, LAYERS_MAX as u64, "layers")?;
-        for table in &tables {
-            if !self.is_table(&table.name)? {
-                return Err(self.malformed(format!("a layer `{}` that is no table", table.name), "plain tables"));
+        let (mut plain, mut unread) = (Vec::new(), Vec::new());
+        for table in tables {
+            let name = table.name.clone();
+            let found = match self.is_table(&name)? {
+                true => self.computed_column(&name)?,
+                false => Some(format!("a layer `{name}` that is no table")),
+            };
+            match found {
+                None => plain.push(table),
+                Some(found) => unread.push(Unread { name, found }),
             }
         }
-        Ok(tables)
+        Ok((plain, unread))
     }
 
     /// The system of a layer, where it names one.
     pub(crate) fn crs(&self, srs: i64) -> Result<Option<Crs>, SourceError> {
         // Undefined, projected and geographic: it is not known which.
-        if srs <= 0 || !self.is_table("gpkg_spatial_ref_sys")? {
+        if srs <= 0 || !self.is_plain_table("gpkg_spatial_ref_sys")? {
             return Ok(None);
         }
         let query = "SELECT organization, organization_coordsys_id FROM gpkg_spatial_ref_sys WHERE srs_id = ?1";
@@ -132,8 +167,30 @@ impl<'a> Package<'a> {
             (true, Ok(code)) => {
                 Crs::from_epsg(code).map(Some).map_err(|found| refused(format!("EPSG:{code}: {found}")))
             }
-            _ => Err(refused(format!("{who}:{code}"))),
+            _ => match self.definition(srs)? {
+                Some(text) => Crs::from_wkt(&text).map(Some).map_err(|found| refused(format!("{who}:{code}: {found}"))),
+                None => Err(refused(format!("{who}:{code}"))),
+            },
         }
+    }
+
+    /// The well-known text of a system, where one is written: that of version 2 stands in a column of its own, and is
+    /// the only one of systems that version 1 has no words for.
+    fn definition(&self, srs: i64) -> Result<Option<String>, SourceError> {
+        let has = "SELECT 1 FROM pragma_table_xinfo('gpkg_spatial_ref_sys') WHERE name = ?1";
+        for column in ["definition", "definition_12_063"] {
+            let found = self.database.query_row(has, [column], |_| Ok(())).optional();
+            if found.map_err(|error| self.broken(error))?.is_none() {
+                continue;
+            }
+            let query = format!("SELECT {column} FROM gpkg_spatial_ref_sys WHERE srs_id = ?1");
+            let text = self.database.query_row(&query, [srs], |row| row.get::<_, Option<String>>(0)).optional();
+            let text = text.map_err(|error| self.broken(error))?.flatten();
+            if let Some(text) = text.filter(|text| text.contains('[')) {
+                return Ok(Some(text));
+            }
+        }
+        Ok(None)
     }
 
     /// Tells `found` the shape of every row of a layer.
@@ -142,11 +199,12 @@ impl<'a> Package<'a> {
         table: &Table,
         mut found: impl FnMut(RawShape) -> Result<(), SourceError>,
     ) -> Result<(), SourceError> {
+        let chords = Chords::of(self.crs(table.srs).ok().flatten().as_ref());
         self.rows(table, &quoted(&table.column), |row| {
             let value = row.get_ref(0).map_err(|error| self.broken(error))?;
             // A feature without a geometry is legal and adds nothing.
             match value.as_blob_or_null().map_err(|error| self.broken(error))? {
-                Some(blob) => found(geometry(blob).map_err(|found| self.malformed(found, "whole geometries"))?),
+                Some(blob) => found(geometry(blob, chords).map_err(|found| self.malformed(found, "whole geometries"))?),
                 None => Ok(()),
             }
         })

@@ -53,6 +53,54 @@ pub(crate) fn to_one_run<'a>(frames: impl Iterator<Item = &'a mut RasterFrame>) 
     }
 }
 
+/// Brings a line or ring in degrees that crosses the 180th meridian to one run of longitudes. A step of more than half
+/// a turn can only mean the crossing, as each side is drawn the shorter way; one of a whole turn is the side of a box
+/// of the whole Earth. Rings round a pole have no such run and stay as they are.
+pub(crate) fn unwrap<const N: usize>(run: &mut [[f64; N]]) {
+    let crosses = |pair: &[[f64; N]]| {
+        let step = pair[1][0] - pair[0][0];
+        180.0 < step.abs() && step.abs() < 360.0
+    };
+    if !run.windows(2).any(crosses) {
+        return;
+    }
+    let is_ring = run.first().zip(run.last()).is_some_and(|(first, last)| first[..2] == last[..2]);
+    let mut turn = 0.0;
+    let turns: Vec<f64> = run
+        .windows(2)
+        .map(|pair| {
+            let step = pair[1][0] - pair[0][0];
+            turn -= if crosses(pair) { 360.0_f64.copysign(step) } else { 0.0 };
+            turn
+        })
+        .collect();
+    if is_ring && turn != 0.0 {
+        return;
+    }
+    for (vertex, turn) in run[1..].iter_mut().zip(turns) {
+        vertex[0] += turn;
+    }
+}
+
+/// The same of the rings of a polygon; its holes stay in it.
+pub(crate) fn unwrap_polygon<const N: usize>(rings: &mut [Vec<[f64; N]>]) {
+    rings.iter_mut().for_each(|ring| unwrap(ring));
+    let Some((outer, holes)) = rings.split_first_mut() else { return };
+    let middle = |ring: &[[f64; N]]| {
+        let (low, high) = ring
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), vertex| (low.min(vertex[0]), high.max(vertex[0])));
+        (low + high) / 2.0
+    };
+    let outer = middle(outer);
+    for hole in holes {
+        let turn = ((outer - middle(hole)) / 360.0).round() * 360.0;
+        if turn != 0.0 {
+            hole.iter_mut().for_each(|vertex| vertex[0] += turn);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,5 +128,24 @@ mod tests {
         let world: Vec<[f64; 2]> = (-180..180).map(|west| [f64::from(west), f64::from(west) + 0.999]).collect();
         check(&world, &[0.0; 360]);
         check(&[[-180.0, 180.0], [10.0, 11.0]], &[0.0, 0.0]);
+    }
+
+    #[test]
+    fn lines_and_rings_across_the_180th_meridian_lie_in_one_run() {
+        let run = |longitudes: &[f64]| {
+            let mut run: Vec<[f64; 3]> = longitudes.iter().map(|&east| [east, 0.0, f64::NAN]).collect();
+            unwrap(&mut run);
+            run.iter().map(|vertex| vertex[0]).collect::<Vec<f64>>()
+        };
+        assert_eq!(run(&[179.5, -179.5, -179.0, 179.75]), [179.5, 180.5, 181.0, 179.75]);
+        assert_eq!(run(&[-179.5, 179.5, 179.0]), [-179.5, -180.5, -181.0]);
+        assert_eq!(run(&[179.5, -179.5, 179.5]), [179.5, 180.5, 179.5], "a ring");
+        for as_they_are in [&[359.5, 360.5][..], &[-180.0, 180.0, -180.0], &[-100.0, 0.0, 100.0, -100.0], &[], &[7.0]] {
+            assert_eq!(run(as_they_are), as_they_are, "round a pole, round the Earth, or no crossing");
+        }
+        let ring = |longitudes: [f64; 3]| longitudes.map(|east| [east, 0.0, 0.0]).to_vec();
+        let mut rings = [ring([179.0, -179.0, 179.0]), ring([-179.5, -179.25, -179.5])];
+        unwrap_polygon(&mut rings);
+        assert_eq!(rings[1], ring([180.5, 180.75, 180.5]), "a hole in it");
     }
 }

@@ -19,7 +19,7 @@ use crate::limits::{Allowance, GEOJSON_BYTES_MAX, VERTEX_BYTES};
 use crate::shapefile::Parts;
 use crate::shapefile::Shape;
 use crate::store::Store;
-use crate::{SourceError, geopackage, shapefile};
+use crate::{SourceError, geopackage, longitudes, shapefile};
 
 /// Reads every Polygon and MultiPolygon of the GeoJSON file, Shapefile or GeoPackage at `path`, in metres of the
 /// coordinate system EPSG:`epsg`.
@@ -59,7 +59,11 @@ fn of_geopackage(path: &Path, epsg: u32) -> Result<Vec<Polygon>, SourceError> {
     let mut all = Vec::new();
     let package = Package::open(path)?;
     let allowance = Allowance::new(path, package.bytes());
-    for table in package.tables()? {
+    let (tables, unread) = package.tables()?;
+    if let Some(unread) = unread.first() {
+        return Err(unread.refused(path));
+    }
+    for table in tables {
         package.shapes(&table, |shape| collected.add(shape))?;
         let polygons = std::mem::take(&mut collected.polygons);
         if !polygons.is_empty() {
@@ -116,8 +120,12 @@ pub(crate) fn projected(
         }
         Ok(corners)
     };
-    let of_polygon =
-        |polygon: Polygon| Ok(Polygon { rings: polygon.rings.iter().map(ring).collect::<Result<_, SourceError>>()? });
+    let of_polygon = |mut polygon: Polygon| {
+        if crs.is_geographic() {
+            longitudes::unwrap_polygon(&mut polygon.rings);
+        }
+        Ok(Polygon { rings: polygon.rings.iter().map(ring).collect::<Result<_, SourceError>>()? })
+    };
     polygons.into_iter().map(of_polygon).collect()
 }
 

@@ -9,10 +9,11 @@ use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 
 use super::columns::{Texts, with_packed_tags};
+use super::curves::Chords;
 use super::model::{FeatureFile, Wanted, file_name};
 use super::moments::{Clock, day_text};
 use super::overture::{self, Holds, Rule};
-use super::placing::{LEFT_OUT, Placing, look_like_degrees};
+use super::placing::{Placing, look_like_degrees};
 use super::raw::{Part, RawFeature, RawShape};
 use super::value::Value;
 use super::well_known::binary;
@@ -60,6 +61,7 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         Some(crs) => Ok(Some(crs)),
         None => Ok(looks(&file, &columns)?.then(Crs::wgs84)),
     })?;
+    let chords = Chords::of(said.as_ref());
     let mut placing = Placing::new(store.path(), store.file_bytes(), wanted, said)?;
     let (groups, others) = near(&file, &placing);
     for group in others {
@@ -80,13 +82,13 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         };
         // A feature without a geometry is legal and adds nothing.
         let Some(geometry) = &row.geometry else { return Ok(()) };
-        match binary(geometry) {
+        match binary(geometry, chords) {
             Ok(shape) => {
                 if placing.is_shape_near(&shape) {
                     place(&mut placing, &mut texts, (id, shape), &row, holds);
                 }
             }
-            Err(found) => placing.remark(&id, None, found, LEFT_OUT),
+            Err(found) => placing.unread(&id, found),
         }
         placing.allowance().check()
     })?;
@@ -106,7 +108,9 @@ fn looks(file: &GeoParquet, columns: &Type) -> Result<bool, SourceError> {
         if vertices.len() < LOOKED_AT
             && let Some(bytes) = Columns::of(row, file.column(), &Clocks::new()).geometry
         {
-            vertices.extend(binary(&bytes).iter().flat_map(|shape| shape.vertices()).take(LOOKED_AT).copied());
+            vertices.extend(
+                binary(&bytes, Chords::of(None)).iter().flat_map(|shape| shape.vertices()).take(LOOKED_AT).copied(),
+            );
         }
         Ok(())
     })?;

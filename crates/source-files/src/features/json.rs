@@ -22,6 +22,10 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         Some(written) => written,
         None => {
             with_nulls = with_numbers(text);
+            if is_sequence(text) {
+                let reason = "one feature after the other (GeoJSONSeq), expected them in a FeatureCollection";
+                return Err(broken(reason.into()));
+            }
             let reason = || text.parse::<GeoJson>().err().map_or("it is none".to_owned(), |error| error.to_string());
             Written::of(&with_nulls).ok_or_else(|| broken(reason()))?
         }
@@ -53,6 +57,12 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
         placing.place(feature);
     }
     placing.finish(None)
+}
+
+/// Whether each line, or what stands behind each mark between, is a feature of its own.
+fn is_sequence(text: &str) -> bool {
+    let mut records = text.split(['\n', '\u{1e}']).map(str::trim).filter(|record| !record.is_empty());
+    records.next().is_some_and(|first| Written::of(first).is_some()) && records.next().is_some()
 }
 
 /// A property as a tag's value; lists and objects as they are written.

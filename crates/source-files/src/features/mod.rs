@@ -10,6 +10,7 @@ pub(crate) mod clip;
 #[cfg(feature = "geoparquet")]
 mod columnar;
 mod columns;
+pub(crate) mod curves;
 mod formats;
 mod json;
 mod loose;
@@ -23,7 +24,9 @@ mod overture;
 mod packages;
 mod placing;
 pub(crate) mod raw;
+mod seen;
 mod shapes;
+mod sound;
 pub(crate) mod strict;
 mod value;
 pub(crate) mod well_known;

@@ -7,21 +7,23 @@ use rusqlite::types::ValueRef;
 
 use super::clip::Vertex;
 use super::columns::{Texts, with_packed_tags};
+use super::curves::Chords;
 use super::model::{FeatureFile, Wanted};
-use super::placing::{LEFT_OUT, Placing, look_like_degrees};
+use super::placing::{Placing, look_like_degrees};
 use super::raw::RawFeature;
 use super::value::Value;
 use super::well_known::geometry;
 use crate::SourceError;
 use crate::crs::Crs;
-use crate::geopackage::{Column, Package, Table};
+use crate::geopackage::{Column, Package, Table, Unread};
 
 /// Features whose places say whether a layer without a system is in degrees.
 const LOOKED_AT: usize = 1000;
 
 pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceError> {
     let package = Package::open(path)?;
-    let Some(table) = chosen(path, &package, wanted.layer)? else {
+    let (table, unread) = chosen(path, &package, wanted.layer)?;
+    let Some(table) = table else {
         let mut placing = Placing::new(path, package.bytes(), wanted, None)?;
         placing.note("a GeoPackage without a layer of features".into());
         return placing.finish(None);
@@ -30,7 +32,11 @@ pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceEr
         Some(crs) => Ok(Some(crs)),
         None => Ok(looks(path, &package, &table)?.then(Crs::wgs84)),
     })?;
+    let chords = Chords::of(said.as_ref());
     let mut placing = Placing::new(path, package.bytes(), wanted, said)?;
+    for Unread { found, .. } in unread.iter().filter(|_| wanted.layer.is_none()) {
+        placing.note(format!("{found}, which is not read"));
+    }
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let (name, mut texts) = (format!("{file}:{}", table.name), Texts::default());
     let columns = Columns::of(path, &package, &table)?;
@@ -44,7 +50,7 @@ pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceEr
         let shape = match at(1 + columns.geometry)? {
             // A feature without a geometry is legal and adds nothing.
             ValueRef::Null => return Ok(()),
-            ValueRef::Blob(blob) => geometry(blob),
+            ValueRef::Blob(blob) => geometry(blob, chords),
             _ => Err("a geometry that is none".into()),
         };
         match shape {
@@ -54,7 +60,7 @@ pub(super) fn read(path: &Path, wanted: &Wanted) -> Result<FeatureFile, SourceEr
                 placing.place(RawFeature { id, tags: texts.tags(tags), shape });
                 texts.count(placing.allowance());
             }
-            Err(found) => placing.remark(&id, None, found, LEFT_OUT),
+            Err(found) => placing.unread(&id, found),
         }
         Ok(())
     })?;
@@ -102,16 +108,22 @@ impl Columns {
     }
 }
 
-/// The layer that is named, or the only one that holds anything; `None` where there is no layer of features at all.
-fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Option<Table>, SourceError> {
-    let tables = package.tables()?;
+/// The layer that is named, or the only one that holds anything; none where there is no layer of features at all; and
+/// those that cannot be read.
+fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<(Option<Table>, Vec<Unread>), SourceError> {
+    let (tables, unread) = package.tables()?;
     let listed =
         |tables: &[Table]| tables.iter().map(|table| format!("`{}`", table.name)).collect::<Vec<_>>().join(", ");
     let refused = |found: String, expected: String| SourceError::Layer { path: path.into(), found, expected };
+    let named = unread.iter().find(|unread| layer.map_or(tables.is_empty(), |name| unread.name == name));
+    if let Some(unread) = named {
+        return Err(unread.refused(path));
+    }
     if let Some(name) = layer {
         let expected = format!("one of {}", listed(&tables));
         let found = tables.into_iter().find(|table| table.name == name);
-        return found.map(Some).ok_or_else(|| refused(format!("the layer `{name}` named"), expected));
+        let found = found.ok_or_else(|| refused(format!("the layer `{name}` named"), expected))?;
+        return Ok((Some(found), unread));
     }
     let (mut filled, mut empty) = (Vec::new(), Vec::new());
     for table in tables {
@@ -122,18 +134,18 @@ fn chosen(path: &Path, package: &Package, layer: Option<&str>) -> Result<Option<
         return Err(refused(found, "one of them named".into()));
     }
     // Where there is nothing in any layer, there is nothing in whichever is read.
-    Ok(filled.into_iter().chain(empty).next())
+    Ok((filled.into_iter().chain(empty).next(), unread))
 }
 
 /// Whether the first places of a layer look like degrees.
 fn looks(path: &Path, package: &Package, table: &Table) -> Result<bool, SourceError> {
     let columns = Columns::of(path, package, table)?;
-    let (mut vertices, mut count): (Vec<Vertex>, _) = (Vec::new(), 0);
+    let (mut vertices, mut count, chords): (Vec<Vertex>, _, _) = (Vec::new(), 0, Chords::of(None));
     package.rows(table, "*", |row| {
         count += 1;
         match row.get_ref(columns.geometry) {
             Ok(ValueRef::Blob(blob)) if count <= LOOKED_AT => {
-                vertices.extend(geometry(blob).iter().flat_map(|shape| shape.vertices()).take(LOOKED_AT));
+                vertices.extend(geometry(blob, chords).iter().flat_map(|shape| shape.vertices()).take(LOOKED_AT));
             }
             _ => {}
         }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::clip::{self, Extent, Vertex};
 use super::model::{Done, FeatureFile, Remark, Tags, VectorFeature, VectorShape, Vertices, Wanted};
 use super::raw::{Part, RawFeature};
+use super::seen::{between, seen_in};
 use crate::crs::Crs;
 use crate::limits::{Allowance, HEIGHT_M_MAX, REMARKS_MAX, VERTEX_BYTES};
 use crate::polygons::pieces_of;
@@ -41,6 +42,8 @@ pub(super) struct Placing {
     off_the_earth: u64,
     /// Lines and polygons that are none, and what was found of the first.
     unsound: (u64, Option<String>),
+    /// Features of a shape that is not read, and what was found of the first.
+    unread: (u64, Option<String>),
     /// Of the whole file, whose parts share it.
     allowance: Arc<Allowance>,
     file: FeatureFile,
@@ -71,6 +74,7 @@ impl Placing {
             remarks_beyond: 0,
             off_the_earth: 0,
             unsound: (0, None),
+            unread: (0, None),
             allowance: Arc::new(Allowance::new(path, file_bytes)),
             file,
         })
@@ -85,6 +89,7 @@ impl Placing {
             remarks_beyond: 0,
             off_the_earth: 0,
             unsound: (0, None),
+            unread: (0, None),
             allowance: self.allowance.clone(),
             file: FeatureFile::default(),
             ..*self
@@ -103,6 +108,8 @@ impl Placing {
         self.off_the_earth += part.off_the_earth;
         self.unsound.0 += part.unsound.0;
         self.unsound.1 = self.unsound.1.take().or(part.unsound.1);
+        self.unread.0 += part.unread.0;
+        self.unread.1 = self.unread.1.take().or(part.unread.1);
         let FeatureFile { mut features, remarks, notes, found, outside, attribution: _, buildings: _ } = part.file;
         self.file.features.append(&mut features);
         self.file.notes.extend(notes);
@@ -122,7 +129,7 @@ impl Placing {
     /// Whether something with this extent may lie near the area.
     #[cfg(feature = "geoparquet")]
     pub(super) fn is_near(&self, extent: &Extent) -> bool {
-        self.turned(extent).is_some()
+        self.turns(extent).next().is_some()
     }
 
     /// Whether a shape may lie near the area, or has something that is to be told; counts one that does not.
@@ -164,6 +171,13 @@ impl Placing {
         self.unsound.0 += 1;
     }
 
+    /// Tells of a feature whose shape cannot be read.
+    pub(super) fn unread(&mut self, id: &str, found: String) {
+        self.unread.0 += 1;
+        self.unread.1.get_or_insert_with(|| found.clone());
+        self.remark(id, None, found, LEFT_OUT);
+    }
+
     /// Where a vertex of the file lies, for remarks.
     pub(super) fn at(&self, vertex: &Vertex) -> Option<[f64; 2]> {
         let place = [vertex[0], vertex[1]];
@@ -196,6 +210,10 @@ impl Placing {
             }
         }
         if let Some(other) = shape.other {
+            if other != "Point" {
+                self.unread.0 += 1;
+                self.unread.1.get_or_insert_with(|| format!("a {other}"));
+            }
             let done = if shape.parts.is_empty() { "left out" } else { "left out, its lines and polygons kept" };
             let found = format!("a {other}, where lines and polygons are read");
             self.remark(&id, None, found, Done::LeftOut(done));
@@ -213,19 +231,21 @@ impl Placing {
             self.off_the_earth += 1;
             return self.remark(&id, None, found, LEFT_OUT);
         }
+        if self.source.is_geographic() {
+            shape.parts.iter_mut().for_each(Part::unwrap);
+        }
         let extent = Extent::around(shape.vertices().map(|&[east, north, _]| [east, north]));
         self.lies_over(&extent);
-        let Some(turned) = self.turned(&extent) else { return self.count_one_outside() };
+        if self.turns(&extent).next().is_none() {
+            return self.count_one_outside();
+        }
         let mut placed = Vec::new();
         let parts: Vec<Part> = shape.parts.into_iter().filter_map(|part| self.sound(&id, part)).collect();
         if parts.is_empty() {
             return;
         }
-        for mut part in parts {
-            if turned != 0.0 {
-                part.turn(turned);
-            }
-            match self.part(part) {
+        for part in parts {
+            match self.part_in_any_turn(part) {
                 Some(mut shapes) => placed.append(&mut shapes),
                 None => {
                     let found = "a vertex that the area's coordinate system cannot express".into();
@@ -240,46 +260,6 @@ impl Placing {
         self.keep(id, tags, placed, heights);
     }
 
-    /// A part that has enough vertices, its rings closed.
-    fn sound(&mut self, id: &str, part: Part) -> Option<Part> {
-        let first = part.runs().flatten().next().copied();
-        let at = |placing: &Self| first.and_then(|vertex| placing.at(&vertex));
-        match part {
-            Part::Point(_) => Some(part),
-            Part::Line(line) if line.len() < 2 => {
-                let at = at(self);
-                self.remark(id, at, format!("a line of {}", counted(line.len())), LEFT_OUT);
-                None
-            }
-            Part::Line(line) => Some(Part::Line(line)),
-            Part::Polygon(rings) => {
-                let mut sound = Vec::with_capacity(rings.len());
-                for (index, mut ring) in rings.into_iter().enumerate() {
-                    if let (Some(&first), Some(last)) = (ring.first(), ring.last())
-                        && first[..2] != last[..2]
-                    {
-                        let at = at(self);
-                        self.remark(id, at, "a ring whose last vertex is not its first".into(), Done::Kept("closed"));
-                        ring.push(first);
-                    }
-                    if ring.len() < 4 {
-                        let found = format!("a ring of {}, the last being the first", counted(ring.len()));
-                        let done = if index == 0 { LEFT_OUT } else { Done::LeftOut("the hole left out") };
-                        let at = at(self);
-                        self.remark(id, at, found, done);
-                        // Without its outer ring there is nothing to have holes.
-                        if index == 0 {
-                            return None;
-                        }
-                    } else {
-                        sound.push(ring);
-                    }
-                }
-                Some(Part::Polygon(sound))
-            }
-        }
-    }
-
     fn count_one_outside(&mut self) {
         self.file.outside += 1;
     }
@@ -292,12 +272,31 @@ impl Placing {
         }
     }
 
-    /// By how many degrees of longitude a feature is to be turned so that it meets what is near, mostly none.
-    fn turned(&self, extent: &Extent) -> Option<f64> {
+    /// By how many degrees of longitude something is to be turned so that it may meet what is near, mostly none.
+    fn turns(&self, extent: &Extent) -> impl Iterator<Item = f64> {
         let turns: &[f64] = if self.source.is_geographic() { &[0.0, -360.0, 360.0] } else { &[0.0] };
-        let turned =
-            |&by: &f64| self.near.meets(&Extent { east: extent.east.map(|east| east + by), north: extent.north });
-        turns.iter().copied().find(|by| turned(by))
+        let (near, extent) = (self.near, *extent);
+        let meets =
+            move |by: &f64| near.meets(&Extent { east: extent.east.map(|east| east + by), north: extent.north });
+        turns.iter().copied().filter(meets)
+    }
+
+    /// What of a part lies inside the bounds, turned so that some does; `None` where it cannot be projected. Parts of a
+    /// feature may lie on both sides of the 180th meridian, and one of them round the Earth.
+    fn part_in_any_turn(&self, part: Part) -> Option<Vec<Part>> {
+        let extent = Extent::around(part.runs().flatten().map(|&[east, north, _]| [east, north]));
+        let (mut left, mut turns) = (Some(part), self.turns(&extent).peekable());
+        while let Some(by) = turns.next() {
+            let mut turned = if turns.peek().is_some() { left.clone()? } else { left.take()? };
+            if by != 0.0 {
+                turned.turn(by);
+            }
+            let found = self.part(turned)?;
+            if !found.is_empty() {
+                return Some(found);
+            }
+        }
+        Some(Vec::new())
     }
 
     /// What of a part lies inside the bounds; `None` where it cannot be projected.
@@ -426,6 +425,13 @@ impl Placing {
             let note = format!("{count} of its {found} lines and polygons are left out; the first has {first}");
             self.file.notes.push(note);
         }
+        if let (count, Some(first)) = &self.unread {
+            let note = format!(
+                "{count} of its features are left out, as their shapes are not read; the first has {first}; \
+                lines and polygons come of most: ogr2ogr -nlt CONVERT_TO_LINEAR out.gpkg in.…"
+            );
+            self.file.notes.push(note);
+        }
         if self.file.found == 0 {
             self.file.notes.push("no line or polygon in the file".into());
         } else if self.file.features.is_empty() && 0 < self.file.outside {
@@ -457,39 +463,7 @@ pub(super) const LEFT_OUT: Done = Done::LeftOut("left out");
 /// Metres, or feet, that no coordinate on the Earth exceeds in any system.
 const PLACE_MAX: f64 = 4.0e8;
 
-fn counted(vertices: usize) -> String {
-    format!("{vertices} {}", if vertices == 1 { "vertex" } else { "vertices" })
-}
-
 fn height_m(vertex: &Vertex, unit_m: f64) -> Option<f64> {
     let height_m = vertex[2] * unit_m;
     (height_m.abs() <= HEIGHT_M_MAX).then_some(height_m)
-}
-
-fn between(from: Vertex, to: Vertex, step: u32, pieces: u32) -> Vertex {
-    let (from, to, step) = if to[..2] < from[..2] { (to, from, pieces - step) } else { (from, to, step) };
-    let share = f64::from(step) / f64::from(pieces);
-    [0, 1, 2].map(|axis| from[axis] + share * (to[axis] - from[axis]))
-}
-
-/// A rectangle of the system `from` as it lies in another: the one round its border, with some more, or everywhere
-/// where a part of it cannot be expressed.
-fn seen_in(from: &Crs, to: &Crs, extent: &Extent) -> Extent {
-    const STEPS: u32 = 32;
-    let mut seen = Extent::NOTHING;
-    for step in 0..=STEPS {
-        let share = f64::from(step) / f64::from(STEPS);
-        let along = |side: [f64; 2]| side[0] + share * (side[1] - side[0]);
-        for side in 0..2 {
-            for place in [[along(extent.east), extent.north[side]], [extent.east[side], along(extent.north)]] {
-                match from.to(to, place) {
-                    Some(place) => seen.hold(place),
-                    None => return Extent::ALL,
-                }
-            }
-        }
-    }
-    // Sides bend between the places that were looked at.
-    let widest = (seen.east[1] - seen.east[0]).max(seen.north[1] - seen.north[0]);
-    seen.grown(0.05 * widest)
 }

@@ -2,6 +2,7 @@
 
 use super::clip::Vertex;
 use super::model::Tags;
+use crate::longitudes;
 
 /// A feature in its file's coordinates.
 #[derive(Debug)]
@@ -22,7 +23,7 @@ pub(crate) struct RawShape {
 }
 
 /// A point, a line, or a polygon: its outer ring, then its holes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Part {
     Point(Vertex),
     Line(Vec<Vertex>),
@@ -38,6 +39,15 @@ impl Part {
             Part::Polygon(rings) => (None, rings.as_slice()),
         };
         single.into_iter().chain(rings.iter().map(Vec::as_slice))
+    }
+
+    /// Brings what crosses the 180th meridian, in degrees, to one run of longitudes.
+    pub(super) fn unwrap(&mut self) {
+        match self {
+            Part::Point(_) => {}
+            Part::Line(line) => longitudes::unwrap(line),
+            Part::Polygon(rings) => longitudes::unwrap_polygon(rings),
+        }
     }
 
     /// Moves it east by so much.

@@ -1,13 +1,14 @@
 //! Geometries as GeoPackages store them: a header with a box around each, then well-known binary.
 
 use super::clip::Vertex;
+use super::curves::Chords;
 use super::raw::{Part, RawShape};
 
-/// The points, lines and polygons of a geometry.
+/// The points, lines and polygons of a geometry, its arcs as chords.
 ///
 /// # Errors
 /// In words, what it is instead of a geometry.
-pub(crate) fn geometry(blob: &[u8]) -> Result<RawShape, String> {
+pub(crate) fn geometry(blob: &[u8], chords: Chords) -> Result<RawShape, String> {
     let &[b'G', b'P', _, flags, ..] = blob else { return Err("a geometry without its mark, GP".into()) };
     let numbers = match flags >> 1 & 7 {
         0 => 0,
@@ -16,15 +17,16 @@ pub(crate) fn geometry(blob: &[u8]) -> Result<RawShape, String> {
         4 => 8,
         other => return Err(format!("a geometry with a box of kind {other}")),
     };
-    binary(blob.get(8 + 8 * numbers..).ok_or_else(cut_short)?)
+    binary(blob.get(8 + 8 * numbers..).ok_or_else(cut_short)?, chords)
 }
 
-/// The points, lines and polygons of well-known binary, as the standard or PostGIS writes it.
+/// The points, lines and polygons of well-known binary, as the standard or PostGIS writes it, its arcs as
+/// chords.
 ///
 /// # Errors
 /// In words, what it is instead of a geometry.
-pub(crate) fn binary(bytes: &[u8]) -> Result<RawShape, String> {
-    let mut binary = Binary { bytes, at: 0, shape: RawShape::default() };
+pub(crate) fn binary(bytes: &[u8], chords: Chords) -> Result<RawShape, String> {
+    let mut binary = Binary { bytes, at: 0, shape: RawShape::default(), chords };
     binary.add(0)?;
     Ok(binary.shape)
 }
@@ -38,6 +40,7 @@ struct Binary<'a> {
     bytes: &'a [u8],
     at: usize,
     shape: RawShape,
+    chords: Chords,
 }
 
 /// How the numbers of a geometry are written.
@@ -60,13 +63,8 @@ impl Binary<'_> {
         Ok(if is_little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
     }
 
-    /// Adds one geometry; `false` where what follows it cannot be found.
-    fn add(&mut self, depth: usize) -> Result<bool, String> {
-        /// Collections in collections.
-        const DEPTH_MAX: usize = 8;
-        if DEPTH_MAX < depth {
-            return Err("collections in collections in collections".into());
-        }
+    /// What kind a geometry is of, and how its numbers are written.
+    fn head(&mut self) -> Result<(u32, Axes), String> {
         let [order] = self.take()?;
         let is_little = order == 1;
         let code = self.number(is_little)?;
@@ -78,16 +76,28 @@ impl Binary<'_> {
             2 => [false, true],
             _ => [true, true],
         };
-        let axes = Axes { is_little, has_heights, count: 2 + usize::from(has_heights) + usize::from(has_measures) };
-        match kind % 1000 {
+        let count = 2 + usize::from(has_heights) + usize::from(has_measures);
+        Ok((kind % 1000, Axes { is_little, has_heights, count }))
+    }
+
+    /// Adds one geometry; `false` where what follows it cannot be found.
+    fn add(&mut self, depth: usize) -> Result<bool, String> {
+        /// Collections in collections.
+        const DEPTH_MAX: usize = 8;
+        if DEPTH_MAX < depth {
+            return Err("collections in collections in collections".into());
+        }
+        let (kind, axes) = self.head()?;
+        let Axes { is_little, has_heights, .. } = axes;
+        match kind {
             1 => {
                 let place = self.place(axes)?;
                 // POINT EMPTY is nowhere.
                 self.shape.parts.extend((!place[0].is_nan()).then_some(Part::Point(place)));
                 self.shape.has_heights |= has_heights;
             }
-            2 => {
-                let line = self.run(axes)?;
+            2 | 8 | 9 => {
+                let line = self.curve(kind, axes)?;
                 // LINESTRING EMPTY has no vertices.
                 self.shape.parts.extend((!line.is_empty()).then_some(Part::Line(line)));
                 self.shape.has_heights |= has_heights;
@@ -96,6 +106,15 @@ impl Binary<'_> {
                 let count = self.number(is_little)?;
                 let rings = (0..count).map(|_| self.run(axes)).collect::<Result<Vec<_>, _>>()?;
                 // POLYGON EMPTY has no rings.
+                self.shape.parts.extend((!rings.is_empty()).then_some(Part::Polygon(rings)));
+                self.shape.has_heights |= has_heights;
+            }
+            10 => {
+                let rings = (0..self.number(is_little)?).map(|_| {
+                    let (kind, axes) = self.head()?;
+                    self.curve(kind, axes)
+                });
+                let rings = rings.collect::<Result<Vec<_>, _>>()?;
                 self.shape.parts.extend((!rings.is_empty()).then_some(Part::Polygon(rings)));
                 self.shape.has_heights |= has_heights;
             }
@@ -112,6 +131,31 @@ impl Binary<'_> {
             }
         }
         Ok(true)
+    }
+
+    /// A line, arcs, or one of both after the other.
+    fn curve(&mut self, kind: u32, axes: Axes) -> Result<Vec<Vertex>, String> {
+        match kind {
+            2 => self.run(axes),
+            8 => {
+                let places = self.run(axes)?;
+                self.chords.draw(&places)
+            }
+            9 => {
+                let mut joined: Vec<Vertex> = Vec::new();
+                for _ in 0..self.number(axes.is_little)? {
+                    let (kind, axes) = self.head()?;
+                    if !matches!(kind, 2 | 8) {
+                        return Err(format!("a curve with a part of kind {kind}"));
+                    }
+                    let next = self.curve(kind, axes)?;
+                    let meets = joined.last().zip(next.first()).is_some_and(|(last, first)| last[..2] == first[..2]);
+                    joined.extend(next.into_iter().skip(usize::from(meets)));
+                }
+                Ok(joined)
+            }
+            other => Err(format!("a curve of kind {other}")),
+        }
     }
 
     fn run(&mut self, axes: Axes) -> Result<Vec<Vertex>, String> {

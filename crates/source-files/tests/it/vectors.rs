@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use source_files::{
-    DemFile, FeatureFile, Reading, SourceError, VectorFeature, VectorShape, Wanted, feature_layers, is_feature_file,
-    read_features,
+    DemFile, Extent, FeatureFile, Reading, SourceError, VectorFeature, VectorShape, Wanted, feature_layers,
+    is_feature_file, read_features,
 };
 use terrain::in_turn;
 
@@ -146,6 +146,46 @@ fn degrees_counted_eastward_all_round_are_the_same_places() {
 }
 
 #[test]
+fn what_crosses_the_180th_meridian_is_the_same_however_longitudes_are_counted() {
+    let bounds = Extent { east: [700_000.0, 730_000.0], north: [5_500_000.0, 5_600_000.0] };
+    let wanted = Wanted { epsg: 32_660, bounds, ..WANTED };
+    let folder = Folder::new();
+    let places = |kind: &str, coordinates: &str| {
+        let text = format!(r#"{{"type":"{kind}","coordinates":{coordinates}}}"#);
+        let file = read_features(&folder.write("a.geojson", text.as_bytes()), &wanted, &in_turn).unwrap();
+        assert_eq!((file.outside, remarks(&file)), (0, vec![]), "{coordinates}");
+        let flat = |shape: VectorShape| match shape {
+            VectorShape::Point(place) => vec![place],
+            VectorShape::Line(line) => line.places,
+            VectorShape::Polygon(rings) => rings.into_iter().flat_map(|ring| ring.places).collect(),
+        };
+        file.features.into_iter().map(|feature| flat(feature.shape)).collect::<Vec<_>>()
+    };
+    for (kind, eastward, crossing) in [
+        ("LineString", "[[179.99,50],[180.01,50.001]]", "[[179.99,50],[-179.99,50.001]]"),
+        ("LineString", "[[180.01,50],[179.99,50]]", "[[-179.99,50],[179.99,50]]"),
+        (
+            "Polygon",
+            "[[[179.99,50],[180.01,50],[180.01,50.01],[179.99,50]]]",
+            "[[[179.99,50],[-179.99,50],[-179.99,50.01],[179.99,50]]]",
+        ),
+        (
+            "MultiLineString",
+            "[[[179.99,50],[180,50]],[[180,50],[180.01,50]]]",
+            "[[[179.99,50],[180,50]],[[-180,50],[-179.99,50]]]",
+        ),
+    ] {
+        let (one, other) = (places(kind, eastward), places(kind, crossing));
+        assert_eq!(one.len(), other.len(), "{kind}");
+        for (one, other) in one.iter().zip(&other) {
+            assert_eq!(one.len(), other.len(), "{kind}");
+            let off = one.iter().zip(other).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max);
+            assert!(off < 1.0e-6, "{kind}: {off} m");
+        }
+    }
+}
+
+#[test]
 fn features_elsewhere_are_counted_and_where_they_lie_is_told() {
     let file = json(&[(r#"{"type":"LineString","coordinates":[[8,47],[8.5,47.25]]}"#, "")]);
     assert_eq!((file.features.len(), file.found, file.outside), (0, 1, 1));
@@ -218,6 +258,47 @@ fn a_geopackage_gives_lines_with_heights_and_columns_as_tags() {
     );
 }
 
+/// A geometry that holds others, in well-known binary.
+fn holding(kind: u32, members: &[Vec<u8>]) -> Vec<u8> {
+    let mut bytes = blob(kind, &[])[..13].to_vec();
+    bytes.extend((members.len() as u32).to_le_bytes());
+    members.iter().for_each(|member| bytes.extend(&member[8..]));
+    bytes
+}
+
+/// A curve without a number of runs, as lines have none.
+fn curve(kind: u32, run: &[&[f64]]) -> Vec<u8> {
+    let mut bytes = blob(2, &[run]);
+    bytes[9..13].copy_from_slice(&kind.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn curves_of_a_geopackage_become_chords() {
+    let folder = Folder::new();
+    let (west, top, east) = ([500_000.0, 3.87e6], [500_100.0, 3_870_100.0], [500_200.0, 3.87e6]);
+    let arc = curve(8, &[&west, &top, &east]);
+    let high = curve(1008, &[&[west[0], west[1], 5.0], &[top[0], top[1], 6.0], &[east[0], east[1], 7.0]]);
+    let back = curve(2, &[&east, &west]);
+    let joined = holding(9, &[arc.clone(), back.clone()]);
+    let hole = curve(8, &[&[500_090.0, 3_870_050.0], &[500_110.0, 3_870_050.0], &[500_090.0, 3_870_050.0]]);
+    let area = holding(10, &[joined.clone(), hole]);
+    let shapes = [arc.clone(), high, joined, area.clone(), holding(11, &[arc, back]), holding(12, &[area])];
+    let unread: Vec<Vec<u8>> = (0..2).map(|_| holding(15, &[])).collect();
+    let file = read(&package(&folder, &[("curves", &[&shapes[..], &unread].concat())]));
+    assert_eq!(file.features.len(), 7, "two of the many lines");
+    let [arc, high, joined, area] = &file.features[..4] else { panic!("expected four") };
+    let count = sizes(arc).0[0];
+    assert!((30..120).contains(&count), "{count}");
+    assert_eq!(sizes(high).1[..], [&[Some(5.0)], &sizes(high).1[1..]].concat());
+    assert_eq!(sizes(high).1.last(), Some(&Some(7.0)));
+    assert_eq!(sizes(joined).0, [count + 1], "where one ends the other begins");
+    assert!(matches!(sizes(area).0[..], [outer, hole] if outer == count + 1 && 9 < hole), "{:?}", sizes(area).0);
+    let note =
+        "2 of its features are left out, as their shapes are not read; the first has a geometry of some other kind";
+    assert!(file.notes.iter().any(|told| told.starts_with(note)), "{:?}", file.notes);
+}
+
 #[test]
 fn points_are_read_where_they_are_wanted() {
     let folder = Folder::new();
@@ -233,6 +314,55 @@ fn points_are_read_where_they_are_wanted() {
     assert_eq!(places(&path), [at(500_000.0)], "the other lies outside");
     let text = r#"{"type":"MultiPoint","coordinates":[[500000,3870000],[500100,3870000,7]]}"#;
     assert_eq!(places(&folder.write("a.geojson", text.as_bytes())), [at(500_000.0), at(500_100.0)]);
+}
+
+#[test]
+fn a_system_that_a_geopackage_spells_out_is_read_with_its_heights() {
+    let folder = Folder::new();
+    let path =
+        package(&folder, &[("rivers", &[blob(1002, &[&[&[500_000.0, 3.87e6, 100.0], &[500_100.0, 3.87e6, 10.0]]])])]);
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let text = r#"COMPOUNDCRS["x",PROJCRS["WGS 84 / UTM zone 11N",ID["EPSG",32611]],VERTCRS["NAVD88 height (ftUS)",
+        VDATUM["x"],CS[vertical,1],AXIS["h",up],LENGTHUNIT["US survey foot",0.304800609601219],ID["EPSG",6360]]]"#;
+    let more = format!(
+        "UPDATE gpkg_spatial_ref_sys SET organization = 'NONE', organization_coordsys_id = 100000 WHERE srs_id = 7;
+        ALTER TABLE gpkg_spatial_ref_sys ADD COLUMN definition TEXT DEFAULT 'undefined';"
+    );
+    database.execute_batch(&more).unwrap();
+    let error = read_features(&path, &WANTED, &in_turn).unwrap_err().to_string();
+    assert!(error.contains("NONE:100000"), "{error}");
+    database.execute_batch("ALTER TABLE gpkg_spatial_ref_sys ADD COLUMN definition_12_063 TEXT").unwrap();
+    database.execute("UPDATE gpkg_spatial_ref_sys SET definition_12_063 = ?1", [text]).unwrap();
+    let heights = sizes(&read(&path).features[0]).1;
+    assert!((heights[0].unwrap() - 30.48).abs() < 1.0e-3, "{heights:?}");
+}
+
+#[test]
+fn a_layer_that_is_a_program_keeps_no_other_from_being_read() {
+    let folder = Folder::new();
+    let path = package(&folder, &[("rivers", &[blob(1002, &[RUN])])]);
+    let database = rusqlite::Connection::open(&path).unwrap();
+    let view = "CREATE VIEW all_rivers AS SELECT * FROM rivers;
+        INSERT INTO gpkg_geometry_columns VALUES ('all_rivers', 'geom', 7);";
+    database.execute_batch(view).unwrap();
+    let file = read(&path);
+    assert_eq!(ids(&file), ["hydro.gpkg:rivers#1"]);
+    assert_eq!(file.notes, ["a layer `all_rivers` that is no table, which is not read"]);
+    let of = |layer| read_features(&path, &Wanted { layer: Some(layer), ..WANTED }, &in_turn);
+    assert_eq!(of("rivers").unwrap().notes, [""; 0]);
+    let error = of("all_rivers").unwrap_err();
+    assert!(error.to_string().contains("a layer `all_rivers` that is no table"), "{error}");
+    assert!(error.hint().unwrap().contains("ogr2ogr"), "{error}");
+}
+
+#[test]
+fn a_sequence_of_features_is_told_as_what_it_is() {
+    let folder = Folder::new();
+    let feature = format!(r#"{{"type":"Feature","properties":null,"geometry":{LINE}}}"#);
+    for text in [format!("{feature}\n{feature}\n"), format!("\u{1e}{feature}\n\u{1e}{feature}\n")] {
+        let error = read_features(&folder.write("a.geojson", text.as_bytes()), &WANTED, &in_turn).unwrap_err();
+        assert!(error.to_string().contains("GeoJSONSeq"), "{error}");
+    }
 }
 
 #[test]
