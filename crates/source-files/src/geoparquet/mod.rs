@@ -104,7 +104,12 @@ impl GeoParquet {
             path: path.into(),
             found: "a Parquet file that is no GeoParquet: nothing in it says which column holds geometries".into(),
         })?;
-        let mut geo = Geo::read(text).map_err(|(found, expected)| broken(path, found, expected))?;
+        let mut geo = Geo::read(text).map_err(|(found, expected)| match expected {
+            WELL_KNOWN_BINARY => {
+                SourceError::NotFeatures { path: path.into(), found: format!("GeoParquet with {found}") }
+            }
+            expected => broken(path, found, expected),
+        })?;
         check_groups(path, len, &metadata)?;
         geo.boxes = geo.boxes.or_else(|| boxes_of(metadata.file_metadata().schema()));
         Ok(Self { path: path.into(), len, metadata, geo })
@@ -341,6 +346,9 @@ fn broken(path: &Path, found: String, expected: &str) -> SourceError {
     SourceError::Malformed { path: path.into(), what: "the GeoParquet".into(), found, expected: expected.into() }
 }
 
+/// The only encoding of geometries that is read.
+const WELL_KNOWN_BINARY: &str = "WKB";
+
 /// The column of geometries and their system.
 #[derive(Clone, Debug)]
 struct Geo {
@@ -366,7 +374,9 @@ impl Geo {
         let column = all.get("columns").and_then(|columns| columns.get(name)).ok_or_else(broken)?;
         match column.get("encoding").and_then(JsonValue::as_str) {
             Some("WKB") => {}
-            other => return Err((format!("geometries encoded as {}", other.unwrap_or("nothing")), "WKB")),
+            other => {
+                return Err((format!("geometries encoded as {}", other.unwrap_or("nothing")), WELL_KNOWN_BINARY));
+            }
         }
         let boxes = column.get("covering").and_then(|covering| covering.get("bbox")).and_then(|boxes| {
             let path = |name: &str| {
@@ -398,7 +408,7 @@ impl Geo {
     }
 }
 
-/// The system that PROJJSON describes, by its code: that of the whole, or of its part on the ground.
+/// The system that PROJJSON describes, by its code: that of the whole, or of its parts on the ground and of heights.
 fn of_projjson(json: &JsonValue) -> Result<Crs, String> {
     let code = |json: &JsonValue| {
         let id = json.get("id")?;
@@ -406,17 +416,56 @@ fn of_projjson(json: &JsonValue) -> Result<Crs, String> {
         let code = code.as_str().map_or_else(|| code.to_string(), str::to_owned);
         Some((id.get("authority")?.as_str()?.to_ascii_uppercase(), code))
     };
-    let ground = json.get("components").and_then(|parts| parts.get(0)).or_else(|| json.get("source_crs"));
-    let (authority, code) = code(json).or_else(|| code(ground?)).ok_or_else(|| {
+    let part = |index: usize| json.get("components").and_then(|parts| parts.get(index));
+    let own = code(json);
+    let heights = if own.is_none() { part(1) } else { None };
+    let ground = part(0).or_else(|| json.get("source_crs"));
+    let (authority, code) = own.or_else(|| code(ground?)).ok_or_else(|| {
         let name = json.get("name").and_then(JsonValue::as_str).unwrap_or("without a name");
         format!("{name}, without a code")
     })?;
-    match (authority.as_str(), code.as_str()) {
-        ("OGC", "CRS84" | "CRS84h") => Ok(Crs::wgs84()),
+    let crs = match (authority.as_str(), code.as_str()) {
+        ("OGC", "CRS84" | "CRS84h") => Crs::wgs84(),
         ("EPSG", number) => {
             let found = number.parse().map_err(|_| "no number".to_owned()).and_then(Crs::from_epsg);
-            found.map_err(|found| format!("EPSG:{number}: {found}"))
+            found.map_err(|found| format!("EPSG:{number}: {found}"))?
         }
-        _ => Err(format!("{authority}:{code}")),
+        _ => return Err(format!("{authority}:{code}")),
+    };
+    heights.map_or(Ok(crs.clone()), |heights| with_heights(crs, heights))
+}
+
+/// A system with the heights of the vertical system that PROJJSON describes.
+fn with_heights(crs: Crs, json: &JsonValue) -> Result<Crs, String> {
+    // A vertical system with its shift to another is wrapped in one of both.
+    let json = json.get("source_crs").unwrap_or(json);
+    let id = json.get("id").filter(|id| id.get("authority").and_then(JsonValue::as_str) == Some("EPSG"));
+    let code = id.and_then(|id| id.get("code")?.as_u64()).and_then(|code| u32::try_from(code).ok());
+    let axis = json.get("coordinate_system").and_then(|system| system.get("axis")?.get(0));
+    if axis.and_then(|axis| axis.get("direction")?.as_str()) == Some("down") {
+        return Err("depths, which count downwards".into());
+    }
+    let unit = axis.and_then(|axis| axis.get("unit"));
+    let unit_m = match unit.and_then(JsonValue::as_str) {
+        Some("metre") => Some(1.0),
+        _ => unit.and_then(|unit| unit.get("conversion_factor")?.as_f64()),
+    };
+    crs.with_heights(code, json.get("name").and_then(JsonValue::as_str).unwrap_or_default(), unit_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_compound_system_has_the_unit_of_its_vertical_part() {
+        let of = |vertical: &str| {
+            let text = format!(r#"{{"components":[{{"id":{{"authority":"EPSG","code":32612}}}},{vertical}]}}"#);
+            of_projjson(&text.parse().unwrap()).unwrap()
+        };
+        let feet = of(r#"{"name":"NAVD88 height (ftUS)","id":{"authority":"EPSG","code":6360}}"#);
+        assert_eq!((feet.vertical_unit_m(), feet.vertical_datum()), (Some(1200.0 / 3937.0), Some("NAVD88")));
+        let own = r#"{"name":"x","coordinate_system":{"axis":[{"unit":{"name":"foot","conversion_factor":0.3048}}]}}"#;
+        assert_eq!(of(own).vertical_unit_m(), Some(0.3048));
     }
 }

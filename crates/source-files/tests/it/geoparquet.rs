@@ -216,6 +216,26 @@ fn the_system_is_as_the_file_says_and_boxes_may_be_without_a_word() {
 }
 
 #[test]
+fn heights_are_in_the_unit_that_the_system_says() {
+    let folder = Folder::new();
+    let read = |vertical: &str| {
+        let geo = r#"{"primary_column":"geometry","columns":{"geometry":{"encoding":"WKB","crs":{"components":
+            [{"id":{"authority":"EPSG","code":4326}},VERTICAL]}}}}"#;
+        let bytes = file(&[&[BRIDGE]], Some(&geo.replace("VERTICAL", vertical)), Compression::UNCOMPRESSED);
+        footer(&bytes).and_then(|found| groups_near(&found, &WANTED)).map_err(|error| error.to_string())?;
+        let path = folder.write("a.parquet", &bytes);
+        read_features(&path, &WANTED, &in_turn).map(|file| file.features.len()).map_err(|error| error.to_string())
+    };
+    assert_eq!(read(r#"{"name":"NAVD88 height (ftUS)","id":{"authority":"EPSG","code":6360}}"#), Ok(3));
+    let axis =
+        |unit: &str| format!(r#"{{"name":"x","coordinate_system":{{"axis":[{{"direction":"up","unit":{unit}}}]}}}}"#);
+    assert_eq!(read(&axis(r#""metre""#)), Ok(3));
+    assert_eq!(read(&axis(r#"{"type":"LinearUnit","name":"foot","conversion_factor":0.3048}"#)), Ok(3));
+    assert!(read(&axis(r#""fathom""#)).unwrap_err().contains("no unit"));
+    assert!(read(&axis(r#""metre""#).replace("up", "down")).unwrap_err().contains("downwards"));
+}
+
+#[test]
 fn what_is_no_geoparquet_is_refused_with_a_word() {
     let good = file(&[&[BRIDGE]], Some(GEO), Compression::SNAPPY);
     let folder = Folder::new();
