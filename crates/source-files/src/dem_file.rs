@@ -15,7 +15,7 @@ use crate::geotiff::{FileDecoder, GeoTiff};
 use crate::rows::Rows;
 use crate::store::Store;
 use crate::text_grid::{self, AsciiGrid, Keys};
-use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, hgt, shapefile};
+use crate::{DatumShift, Raster, RasterFrame, SampleScale, SourceError, hgt, shapefile, side_files};
 
 /// How a file is to be read, where that is not as the file itself says.
 #[derive(Clone, Debug)]
@@ -75,16 +75,22 @@ impl DemFile {
     /// Whatever makes it unusable: a format that is not read, by name; broken, too large, or nowhere on Earth.
     pub fn open(path: &Path, reading: &Reading) -> Result<Self, SourceError> {
         let store = Store::open(path)?;
+        let file = Self::of(&store, reading)?;
+        side_files::check(path, file.header.nodata, file.header.scale)?;
+        Ok(file)
+    }
+
+    fn of(store: &Store, reading: &Reading) -> Result<Self, SourceError> {
         let start = store.start(512)?;
         if matches!(start.get(..4), Some(b"II\x2a\0" | b"MM\0\x2a" | b"II\x2b\0" | b"MM\0\x2b")) {
-            return Self::geotiff(&store, reading);
+            return Self::geotiff(store, reading);
         }
         let found = match dted::start(&start) {
-            Some(at) => of_dted(&store, at, reading)?,
-            None if text_grid::begins_like_one(&start) => of_text(&store)?,
-            None => of_bare_rows(&store, &start, reading)?,
+            Some(at) => of_dted(store, at, reading)?,
+            None if text_grid::begins_like_one(&start) => of_text(store)?,
+            None => of_bare_rows(store, &start, reading)?,
         };
-        found.placed(&store, reading)
+        found.placed(store, reading)
     }
 
     fn geotiff(store: &Store, reading: &Reading) -> Result<Self, SourceError> {

@@ -29,6 +29,7 @@ mod dem_file;
 mod dted;
 mod hgt;
 mod rows;
+mod side_files;
 mod text_grid;
 pub use dem_file::{DemFile, Reading};
 mod raster;
