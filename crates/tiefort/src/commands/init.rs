@@ -7,10 +7,10 @@ use build::workbench::{Seen, SeenFeatures, Suggestion};
 use clap::{Args, ValueEnum};
 use job::Job;
 
-use crate::commands::init_around;
 use crate::commands::init_features::{features_section, objects_section, told_of};
 use crate::commands::init_limits::{Asked, Limits, choose};
 use crate::commands::job_words::{comment, quoted, relative};
+use crate::commands::{init_around, init_files};
 use crate::failure::{Failure, Outcome};
 use crate::terminal;
 
@@ -109,8 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Failure> {
     if let (Some(place), Some(dem)) = (arguments.around, &arguments.dem) {
         return around(arguments, place, dem);
     }
-    let (vectors, files): (Vec<PathBuf>, Vec<PathBuf>) =
-        named_files(&arguments.files)?.into_iter().partition(|path| build::workbench::is_feature_file(path));
+    let (vectors, files): (Vec<PathBuf>, Vec<PathBuf>) = init_files::named_files(&arguments.files)?
+        .into_iter()
+        .partition(|path| build::workbench::is_feature_file(path));
     if let ([first, ..], []) = (vectors.as_slice(), files.as_slice()) {
         let path = first.display();
         let message = format!("{path}: found a file of roads, water or buildings, expected a raster beside it");
@@ -169,35 +170,6 @@ fn around(arguments: &Arguments, place: [f64; 2], dem: &str) -> Result<Outcome, 
     let path = out.display();
     terminal::print(&format!("{path} is written; fetch what it names: tiefort fetch {path}\n"))?;
     Ok(Outcome::Sound)
-}
-
-/// The files named, and the rasters and files of features directly in the folders named, by name.
-fn named_files(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    const ENDINGS: [&str; 12] = ["tif", "tiff", "dt0", "dt1", "dt2", "hgt", "asc", "flt", "bil", "img", "zip", "gz"];
-    const OF_FEATURES: [&str; 7] = ["pbf", "gpkg", "shp", "geojson", "json", "parquet", "geoparquet"];
-    let mut all = Vec::new();
-    for path in named {
-        if !path.is_dir() {
-            all.push(path.clone());
-            continue;
-        }
-        let entries = std::fs::read_dir(path).map_err(|error| {
-            Failure::new(format!("{}: {error}", path.display()), "check the path and its permissions")
-        })?;
-        let mut inside: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        inside.retain(|path| {
-            let ending = crate::files::extension(path);
-            let is_of = |endings: &[&str]| endings.contains(&ending.as_str());
-            path.is_file() && (is_of(&ENDINGS) || is_of(&OF_FEATURES) && build::workbench::is_feature_file(path))
-        });
-        inside.sort();
-        if inside.is_empty() {
-            let message = format!("{}: found a folder without rasters, expected some directly in it", path.display());
-            return Err(Failure::new(message, format!("names of rasters end in .{}", ENDINGS[..9].join(", ."))));
-        }
-        all.append(&mut inside);
-    }
-    Ok(all)
 }
 
 /// What was found, and what a build of it takes and leaves: one line, broken where a terminal ends.

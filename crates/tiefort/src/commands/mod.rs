@@ -16,6 +16,7 @@ mod inadequate;
 mod init;
 mod init_around;
 mod init_features;
+mod init_files;
 mod init_limits;
 mod job_words;
 mod man;

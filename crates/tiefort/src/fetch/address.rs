@@ -48,8 +48,12 @@ impl Address {
         let shown = without_query(location);
         let scheme_end = self.url.find("://").map_or(0, |at| at + 3);
         let host_end = self.url[scheme_end..].find('/').map_or(self.url.len(), |at| scheme_end + at);
+        let has_scheme = location.split(['/', '?']).next().is_some_and(|first| first.contains(':'));
         let url = match location.strip_prefix('/') {
             Some(rest) if !rest.starts_with('/') => format!("{}{location}", &self.url[..host_end]),
+            None if !has_scheme && !location.is_empty() => {
+                format!("{}{}", &self.url[..host_end], beside(&without_query(&self.url)[host_end..], location))
+            }
             _ => location.to_owned(),
         };
         let is_less_safe = self.url.starts_with("https://") && !url.starts_with("https://");
@@ -96,6 +100,21 @@ impl Address {
     }
 }
 
+/// The path that another is relative to a path, as `../y.tif` to `/a/b/x.tif`.
+fn beside(path: &str, relative: &str) -> String {
+    let (relative, query) = relative.split_at(relative.find('?').unwrap_or(relative.len()));
+    let mut parts: Vec<&str> = path.split('/').skip(1).collect();
+    parts.pop();
+    for part in relative.split('/') {
+        match part {
+            "." => {}
+            ".." => drop(parts.pop()),
+            part => parts.push(part),
+        }
+    }
+    format!("/{}{query}", parts.join("/"))
+}
+
 /// The bucket and the key of an address of a bucket.
 pub fn in_bucket(named: &str) -> Option<(&str, &str)> {
     named.strip_prefix("s3://").and_then(|rest| rest.split_once('/'))
@@ -135,8 +154,17 @@ mod tests {
         let from = |url: &str| Address::of(url, &none).unwrap();
         let good = from("https://a.org/x.tif?s=1");
         assert_eq!(good.redirected("/y.tif").unwrap().url(), "https://a.org/y.tif");
+        let deep = from("https://a.org/b/c/x.tif?k=1");
+        for (location, expected) in [
+            ("../cog.tif", "https://a.org/b/cog.tif"),
+            ("y.tif?t=a/b", "https://a.org/b/c/y.tif?t=a/b"),
+            ("./d/y.tif", "https://a.org/b/c/d/y.tif"),
+            ("../../../../y.tif", "https://a.org/y.tif"),
+        ] {
+            assert_eq!(deep.redirected(location).unwrap().url(), expected);
+        }
         assert_eq!(good.redirected("https://b.org/y.tif?t=2").unwrap().url(), "https://b.org/y.tif?t=2");
-        for bad in ["file:///etc/passwd", "s3://b/x.tif", "http://127.0.0.1/x.tif", "//b.org/x", "y.tif", "ftp://a/x"] {
+        for bad in ["file:///etc/passwd", "s3://b/x.tif", "http://127.0.0.1/x.tif", "//b.org/x", "", "ftp://a/x"] {
             let fault = good.redirected(bad).unwrap_err().text;
             assert!(fault.contains("is not followed") && !fault.contains("s=1"), "{fault}");
         }

@@ -312,6 +312,7 @@ impl<'a> Client<'a> {
             self.silence.heard();
             match response.status().as_u16() {
                 200 | 206 if is_page(response.headers()) => return Err(page(&address.to_string())),
+                200 | 206 if is_packed(response.headers(), address) => return Err(packed(address)),
                 200 | 206 => return Ok(response),
                 301 | 302 | 303 | 307 | 308 => at = at.redirected(&text(response.headers(), "location"))?,
                 401 | 403 if !is_signed && self.closes(&at) => {}
@@ -337,7 +338,8 @@ impl<'a> Client<'a> {
         is_signed: bool,
     ) -> Result<Response<ureq::Body>, ureq::Error> {
         let agent = if at.is_of_this_machine() { &self.direct } else { &self.agent };
-        let mut request = agent.get(at.url());
+        // A range is of the file, not of what a server would pack it to on its way.
+        let mut request = agent.get(at.url()).header("Accept-Encoding", "identity");
         if let Some(credentials) = self.credentials.as_ref().filter(|_| is_signed) {
             for (name, value) in credentials.headers(at.url(), now()) {
                 request = request.header(name, value);
@@ -408,6 +410,18 @@ impl<'a> Client<'a> {
 /// Whether a server says that it sends a web page: to log in, or of an error that it does not own to.
 fn is_page(headers: &HeaderMap) -> bool {
     text(headers, "content-type").to_ascii_lowercase().starts_with("text/html")
+}
+
+/// Whether a body is packed for its way all the same; of files that are packed themselves some servers say that, too.
+fn is_packed(headers: &HeaderMap, address: &Address) -> bool {
+    let encoding = text(headers, "content-encoding").to_ascii_lowercase();
+    let name = address.to_string().to_ascii_lowercase();
+    !matches!(encoding.as_str(), "" | "identity") && !name.ends_with(".gz") && !name.ends_with(".tgz")
+}
+
+fn packed(address: &Address) -> Fault {
+    let hint = "fetch the file by other means, such as `curl --compressed`, and name it by its path";
+    Fault::hinted(format!("{address}: the server packs it on its way, though it was asked not to"), hint)
 }
 
 fn text(headers: &HeaderMap, name: &str) -> String {

@@ -161,6 +161,8 @@ fn what_servers_do_wrong_is_told_in_a_sentence() {
         (Manner::Redirect("file:///etc/passwd".into()), "leads on to file:///etc/passwd, which is not followed"),
         (Manner::Redirect("http://example.org/dem.tif".into()), "which is not followed"),
         (Manner::Redirect("/dem.tif".into()), "leads on more than 5 times"),
+        (Manner::Redirect("./dem.tif".into()), "leads on more than 5 times"),
+        (Manner::Packed, "the server packs it on its way"),
         (Manner::CutAfter(3), "does not give it to strangers"),
     ] {
         server.behave(manner.clone());

@@ -120,6 +120,14 @@ fn init_tells_to_say_crs_as_an_argument_and_takes_a_folder_for_its_rasters() {
     check(&scene, &["init", "dem"], &["a.asc", "no coordinate reference system"], "--crs EPSG:");
     check(&scene, &["init", "none"], &["none: found a folder without rasters"], ".asc");
     let said = scene.run_to(0, &["init", "dem", "--crs", "EPSG:32611"]);
+    fs::create_dir_all(scene.path("tree/w117")).unwrap();
+    fs::copy(scene.path("dem/a.asc"), scene.path("tree/w117/a.asc")).unwrap();
+    let deeper = scene.run_to(0, &["init", "tree", "--crs", "EPSG:32611"]);
+    assert!(deeper.stdout.contains("tree/w117/a.asc"), "{}", deeper.stdout);
+    fs::copy(scene.path("dem/a.asc"), scene.path("tree/a.asc")).unwrap();
+    let beside = scene.run_to(0, &["init", "tree", "--crs", "EPSG:32611"]);
+    let told = beside.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("files in a folder in tree are not taken"), "{told}");
     let found = "found 1 file: 2 x 2 km at 25 m, no voids, heights above an unknown datum; a build takes about";
     let line = said.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(line.contains(found) && line.contains("leave an RMS residual"), "{}", said.stderr);
