@@ -1,6 +1,6 @@
 //! Why a run ended without a result.
 
-use crate::ground::GroundError;
+use crate::ground::{GroundError, TaskError};
 use crate::product::ProductError;
 use schedule::ScheduleError;
 use source_files::SourceError;
@@ -20,26 +20,9 @@ pub enum CompileError {
     /// The database cannot be read or written.
     #[error(transparent)]
     Database(#[from] DatabaseError),
-    /// A task panicked: a fault of ours.
-    #[error("tile {tile} failed in stage {}: {message}", stage.name())]
-    Panicked {
-        /// The stage.
-        stage: Stage,
-        /// The tile.
-        tile: TileId,
-        /// What the panic said.
-        message: String,
-    },
-    /// The run was asked to stop.
-    #[error("stopped in stage {} with {done} of {total} tiles done", stage.name())]
-    Stopped {
-        /// The stage.
-        stage: Stage,
-        /// Tiles it had finished.
-        done: usize,
-        /// Tiles it has.
-        total: usize,
-    },
+    /// A stage was not worked through to its end.
+    #[error(transparent)]
+    Task(#[from] TaskError),
     /// Other processes build something else in the same directory.
     #[error("{path}: other processes are building from another job or other sources here")]
     OtherRun {
@@ -53,12 +36,6 @@ pub enum CompileError {
         unit: String,
         /// What it waits for.
         needs: String,
-    },
-    /// The system gave no thread.
-    #[error("workers: {found}, expected as many threads as workers")]
-    NoThread {
-        /// What the system said.
-        found: String,
     },
     /// The GeoPackage of features could not be made.
     #[error("features.gpkg cannot be made: {message}")]
@@ -104,18 +81,12 @@ impl CompileError {
         match self {
             CompileError::Ground(error) => error.hint(),
             CompileError::Database(error) => error.hint().map(str::to_owned),
-            CompileError::Panicked { .. } => {
-                Some("this is a fault of the compiler; what was published before is intact".to_owned())
-            }
-            CompileError::Stopped { .. } => {
-                Some("run the same command again; nothing was left half-written".to_owned())
-            }
+            CompileError::Task(error) => Some(error.hint().to_owned()),
             CompileError::Package { .. } => Some("free some memory and build again".to_owned()),
             CompileError::OtherRun { .. } => {
                 Some("wait for them to end, or build into another folder with --out".to_owned())
             }
             CompileError::NotReady { .. } => Some("try again when it is, or run `tiefort build`".to_owned()),
-            CompileError::NoThread { .. } => Some("use fewer --workers".to_owned()),
             CompileError::OtherJob { .. } => Some("run `tiefort build` first, which rebuilds what changed".to_owned()),
         }
     }
@@ -131,16 +102,15 @@ impl CompileError {
 
     /// Whether the run ended because it was asked to.
     pub fn is_stopped(&self) -> bool {
-        matches!(self, CompileError::Stopped { .. } | CompileError::Ground(GroundError::Stopped { .. }))
+        matches!(
+            self,
+            CompileError::Task(TaskError::Stopped { .. })
+                | CompileError::Ground(GroundError::Task(TaskError::Stopped { .. }))
+        )
     }
 
-    /// The error of a stage's tasks, whose numbers are the row-major places of `tiles`.
+    /// The error of a stage's tasks, whose numbers are row-major places of `tiles`; one beyond them names the first.
     pub fn from_schedule<R>(stage: Stage, tiles: &[TileId], error: ScheduleError<R, CompileError>) -> CompileError {
-        match error {
-            ScheduleError::Failed { error, .. } => error,
-            ScheduleError::Panicked { task, message } => CompileError::Panicked { stage, tile: tiles[task], message },
-            ScheduleError::Stopped { done, tasks } => CompileError::Stopped { stage, done: done.len(), total: tasks },
-            ScheduleError::NoThread { message, .. } => CompileError::NoThread { found: message },
-        }
+        TaskError::of(stage.name(), tiles, error, Self::Task)
     }
 }

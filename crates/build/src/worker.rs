@@ -12,6 +12,7 @@ use store::engine::{Claim, Lease, Leases};
 use store::{Folder, ManifestState};
 
 use crate::build::Built;
+use crate::ground::TaskError;
 use crate::order::Unit;
 use crate::run::Options;
 use crate::unit::Session;
@@ -69,7 +70,8 @@ pub fn work(
     loop {
         if options.stop.load(std::sync::atomic::Ordering::Relaxed) {
             let total = worker.session.units().len();
-            return Err(CompileError::Stopped { stage: Stage::Refine, done: total - worker.open.len(), total });
+            let (stage, done) = (Stage::Refine.name(), total - worker.open.len());
+            return Err(TaskError::Stopped { stage, done, total }.into());
         }
         if worker.is_published() {
             // The process that published may have been ended before it swept up.

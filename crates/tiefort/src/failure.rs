@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use build::CompileError;
-use build::ground::GroundError;
+use build::ground::{GroundError, TaskError};
 use build::product::ProductError;
 use exports::ExportError;
 use job::JobError;
@@ -79,8 +79,10 @@ impl Cause {
             CompileError::Ground(GroundError::Database(_))
             | CompileError::Database(_)
             | CompileError::OtherJob { .. } => Self::Database,
-            CompileError::Ground(GroundError::Panicked { .. } | GroundError::OutsideSources { .. })
-            | CompileError::Panicked { .. } => Self::Bug,
+            CompileError::Ground(
+                GroundError::Task(TaskError::Panicked { .. }) | GroundError::OutsideSources { .. },
+            )
+            | CompileError::Task(TaskError::Panicked { .. }) => Self::Bug,
             CompileError::Package { .. } => Self::Output,
             _ => Self::Request,
         }
@@ -273,7 +275,7 @@ mod tests {
 
     #[test]
     fn only_a_run_that_keeps_its_work_is_said_to_go_on() {
-        let stopped = CompileError::Stopped { stage: build::Stage::Refine, done: 1, total: 3 };
+        let stopped = CompileError::Task(TaskError::Stopped { stage: "refine", done: 1, total: 3 });
         let failure = Failure::of_compiler(&stopped, Some(130));
         assert!(!failure.hint().contains("go on") && failure.code == 130, "{failure}");
         assert_eq!(failure.hinted_if_stopped("go on").hint(), "go on");

@@ -1,4 +1,4 @@
-//! Why there is no ground.
+//! Why there is no ground, and why tasks ended early.
 
 use schedule::ScheduleError;
 use source_files::SourceError;
@@ -39,28 +39,9 @@ pub enum GroundError {
         /// The same of all sources under the area.
         expected_m: (f64, f64),
     },
-    /// A task panicked: a fault of ours.
-    #[error("tile {tile} failed in stage read: {message}")]
-    Panicked {
-        /// The tile.
-        tile: TileId,
-        /// What the panic said.
-        message: String,
-    },
-    /// The run was asked to stop.
-    #[error("stopped in stage read with {done} of {total} tiles done")]
-    Stopped {
-        /// Tiles, or parts of a file, that were read.
-        done: usize,
-        /// All there are.
-        total: usize,
-    },
-    /// The system gave no thread.
-    #[error("workers: {found}, expected as many threads as workers")]
-    NoThread {
-        /// What the system said.
-        found: String,
-    },
+    /// It was not read to its end.
+    #[error(transparent)]
+    Task(#[from] TaskError),
 }
 
 impl GroundError {
@@ -73,22 +54,72 @@ impl GroundError {
             GroundError::OutsideSources { .. } => {
                 Some("this is a fault of the compiler; other rules in dem.voids or dem.resampling may avoid it".into())
             }
-            GroundError::Panicked { .. } => {
-                Some("this is a fault of the compiler; what was published before is intact".to_owned())
-            }
-            GroundError::Stopped { .. } => Some("run the same command again; nothing was left half-written".to_owned()),
-            GroundError::NoThread { .. } => Some("use fewer --workers".to_owned()),
+            GroundError::Task(error) => Some(error.hint().to_owned()),
         }
     }
 
-    /// The error of tasks whose numbers are the places of `tiles`.
+    /// The error of tasks whose numbers are the places of `tiles`; one beyond them names the first.
     pub fn from_schedule<R, E: From<GroundError>>(tiles: &[TileId], error: ScheduleError<R, E>) -> E {
-        let error = match error {
+        TaskError::of("read", tiles, error, |error| GroundError::from(error).into())
+    }
+}
+
+/// Why tasks ended early.
+#[derive(Debug, Error)]
+pub enum TaskError {
+    /// A task panicked: a fault of ours.
+    #[error("tile {tile} failed in stage {stage}: {message}")]
+    Panicked {
+        /// The name of the stage.
+        stage: &'static str,
+        /// The tile.
+        tile: TileId,
+        /// What the panic said.
+        message: String,
+    },
+    /// The run was asked to stop.
+    #[error("stopped in stage {stage} with {done} of {total} tiles done")]
+    Stopped {
+        /// The name of the stage.
+        stage: &'static str,
+        /// Tiles, or parts of a file, that were done.
+        done: usize,
+        /// All there are.
+        total: usize,
+    },
+    /// The system gave no thread.
+    #[error("workers: {found}, expected as many threads as workers")]
+    NoThread {
+        /// What the system said.
+        found: String,
+    },
+}
+
+impl TaskError {
+    /// What could be done about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Panicked { .. } => "this is a fault of the compiler; what was published before is intact",
+            Self::Stopped { .. } => "run the same command again; nothing was left half-written",
+            Self::NoThread { .. } => "use fewer --workers",
+        }
+    }
+
+    /// The error of a stage's tasks, whose numbers are the places of `tiles`; one beyond them names the first.
+    pub(crate) fn of<R, E>(
+        stage: &'static str,
+        tiles: &[TileId],
+        error: ScheduleError<R, E>,
+        into: impl FnOnce(Self) -> E,
+    ) -> E {
+        into(match error {
             ScheduleError::Failed { error, .. } => return error,
-            ScheduleError::Panicked { task, message } => GroundError::Panicked { tile: tiles[task], message },
-            ScheduleError::Stopped { done, tasks } => GroundError::Stopped { done: done.len(), total: tasks },
-            ScheduleError::NoThread { message, .. } => GroundError::NoThread { found: message },
-        };
-        error.into()
+            ScheduleError::Panicked { task, message } => {
+                let tile = tiles.get(task).copied().unwrap_or(TileId { row: 0, col: 0 });
+                Self::Panicked { stage, tile, message }
+            }
+            ScheduleError::Stopped { done, tasks } => Self::Stopped { stage, done: done.len(), total: tasks },
+            ScheduleError::NoThread { message, .. } => Self::NoThread { found: message },
+        })
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use job::{Job, Resampling, SourceFile, Voids};
 use schedule::Workers;
 use source_files::{DemFile, Look, Reach, SourceError, WideMosaic, Windows, edge_steps_by_window, window_under};
-use terrain::{PostRect, TileId};
+use terrain::PostRect;
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
@@ -127,8 +127,7 @@ fn look(one: &Reaching, reach: &Reach, workers: &Workers, stop: &AtomicBool) -> 
     let looks = schedule::for_each_independent(&parts, workers, stop, |_, part| {
         one.file.look(one.window, Some(reach), part).map_err(GroundError::from)
     });
-    let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
-    let looks = looks.map_err(|error| GroundError::from_schedule(&nowhere, error))?;
+    let looks = looks.map_err(|error| GroundError::from_schedule(&[], error))?;
     let mut all = Look::default();
     looks.into_iter().for_each(|look| all.add(look));
     Ok(all)

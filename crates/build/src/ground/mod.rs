@@ -3,7 +3,7 @@
 //! [`Ground::open`] opens and judges all that a job names; [`foresee`] judges what headers tell.
 
 mod error;
-pub use error::GroundError;
+pub use error::{GroundError, TaskError};
 mod area;
 pub use area::{GamingArea, PlannedTile, planned_tiles};
 mod relief;

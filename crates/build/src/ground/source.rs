@@ -8,7 +8,7 @@ use source_files::{
     Crs, DatumShift, DemFile, EdgeStep, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, WideMosaic,
     Windows,
 };
-use terrain::{PostRect, TileId};
+use terrain::PostRect;
 
 use crate::ground::GroundError;
 use crate::ground::area::GamingArea;
@@ -117,8 +117,7 @@ pub fn decode(file: &DemFile, window: PostRect, workers: &Workers, stop: &Atomic
     let parts: Vec<&[u32]> = chunks.chunks(chunks.len().div_ceil(4 * workers.count()).max(1)).collect();
     let decoded =
         schedule::for_each_independent(&parts, workers, stop, |_, part| file.decode(part).map_err(GroundError::from));
-    let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
-    let decoded = decoded.map_err(|error| GroundError::from_schedule(&nowhere, error))?;
+    let decoded = decoded.map_err(|error| GroundError::from_schedule(&[], error))?;
     Ok(file.assemble(window, decoded.into_iter().flatten().collect())?)
 }
 

@@ -11,7 +11,7 @@ use schedule::Workers;
 use source_files::{
     Crs, DemFile, Mosaic, MosaicRules, MosaicVoids, Raster, RasterFrame, Reading, SourceError, VoidPolicy,
 };
-use terrain::{Dem, Post, PostRect, Resampling, TileId};
+use terrain::{Dem, Post, PostRect, Resampling};
 
 use crate::workbench::suiting::{SuitingGrid, suiting_grid};
 
@@ -164,8 +164,7 @@ fn resampled(
     let parts = schedule::for_each_independent(&bands, workers, stop, |_, &band| -> Result<Dem, CompileError> {
         Ok(mosaic.resample(band).dem())
     });
-    let nowhere = vec![TileId { row: 0, col: 0 }; bands.len()];
-    let parts = parts.map_err(|error| CompileError::from_schedule(Stage::Read, &nowhere, error))?;
+    let parts = parts.map_err(|error| CompileError::from_schedule(Stage::Read, &[], error))?;
     let part = |post: Post| &parts[((post.row - rect.south) / BAND_ROWS) as usize];
     let mut dem = Dem::from_fn(*rect, |post| (!part(post).is_void(post)).then(|| part(post).height(post)));
     dem.fill_voids(|post| part(post).height(post));

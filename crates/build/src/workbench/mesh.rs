@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use crate::ground::{
-    GivenPost, GroundError, Surroundings, Window, chosen, posts_of_file, refused, scanned, start_posts,
+    GivenPost, GroundError, Surroundings, TaskError, Window, chosen, posts_of_file, refused, scanned, start_posts,
 };
 use crate::{CompileError, Event, Most, Progress, Refinement, Stage, inherited, posts_of};
 use fidelity::{Limit, Tally};
@@ -194,7 +194,7 @@ pub(crate) fn untiled_together(
     let mut all: Option<Tally> = None;
     for (dem, share) in grounds.iter().zip(shares) {
         if stop.load(Ordering::Relaxed) {
-            return Err(CompileError::Stopped { stage: Stage::Survey, done: 0, total: grounds.len() });
+            return Err(TaskError::Stopped { stage: Stage::Survey.name(), done: 0, total: grounds.len() }.into());
         }
         let tin = untiled(&request(2 * share + 2), dem, [spacing_m; 2])?.tin;
         all.get_or_insert_default().merge(&tally_of(dem, &tin));

@@ -7,7 +7,7 @@ use fidelity::{Sums, Tally};
 use schedule::Workers;
 use terrain::geometry::Facet;
 use terrain::geometry::owned::{PostGrid, visit_residuals};
-use terrain::{Dem, Post, PostRect, TileId, Tin, Vertex};
+use terrain::{Dem, Post, PostRect, Tin, Vertex};
 
 /// Residuals at every post that a TIN covers and that is not void, each counted once.
 pub(crate) fn tally_of(dem: &Dem, tin: &Tin) -> Tally {
@@ -25,8 +25,7 @@ pub(crate) fn tally_on_all(dem: &Dem, tin: &Tin, workers: &Workers, stop: &Atomi
     let tallies = schedule::for_each_independent(&parts, workers, stop, |_, part| -> Result<Tally, CompileError> {
         Ok(tally_of_some(dem, tin, part))
     });
-    let nowhere = vec![TileId { row: 0, col: 0 }; parts.len()];
-    let tallies = tallies.map_err(|error| CompileError::from_schedule(Stage::Assemble, &nowhere, error))?;
+    let tallies = tallies.map_err(|error| CompileError::from_schedule(Stage::Assemble, &[], error))?;
     let mut all = Tally::default();
     tallies.iter().for_each(|tally| all.merge(tally));
     Ok(all)

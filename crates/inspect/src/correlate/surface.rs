@@ -175,15 +175,7 @@ fn load_rows(
 
 /// Why work on all workers ended early.
 pub(super) fn ended<R>(error: ScheduleError<R, CompileError>) -> CompileError {
-    match error {
-        ScheduleError::Failed { error, .. } => error,
-        // No tile is at work here: it is the first that is named.
-        ScheduleError::Panicked { message, .. } => {
-            GroundError::Panicked { tile: TileId { row: 0, col: 0 }, message }.into()
-        }
-        ScheduleError::Stopped { done, tasks } => GroundError::Stopped { done: done.len(), total: tasks }.into(),
-        ScheduleError::NoThread { message, .. } => GroundError::NoThread { found: message }.into(),
-    }
+    GroundError::from_schedule(&[], error)
 }
 
 fn damaged(path: &Path, error: ReadError) -> CompileError {

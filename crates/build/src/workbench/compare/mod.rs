@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use fidelity::Tally;
 use terrain::{Dem, PostRect, QUANTA_PER_METRE};
 
-use crate::ground::GroundError;
+use crate::ground::{GroundError, TaskError};
 use crate::workbench::TinMethod;
 use crate::workbench::compare::subject::{Subject, Until};
 use crate::{CompileError, Stage};
@@ -94,7 +94,7 @@ pub fn compare(
     let total = rows.len();
     for (index, row) in rows.iter_mut().enumerate() {
         if stop.load(Ordering::Relaxed) {
-            return Err(CompileError::Stopped { stage: Stage::Refine, done: index, total });
+            return Err(TaskError::Stopped { stage: Stage::Refine.name(), done: index, total }.into());
         }
         tell(CompareEvent::Started(index));
         let tin = row.method.make(&subject, row.asked)?;
