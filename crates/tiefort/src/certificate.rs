@@ -1,7 +1,7 @@
 //! What `tiefort correlate` found, in the words of a certificate.
 
 use inspect::{Confusion, Correlation, HeightFigures, SLOPE_CLASSES, SLOPE_ENDS_DEGREES, SurfaceFacts};
-use views::{Certificate, CertificateMap, CertificateSection, grouped};
+use views::{Certificate, CertificateMap, Section, Table, grouped};
 
 use crate::places;
 
@@ -47,11 +47,7 @@ fn found_percent(share: f64) -> String {
     format!("{:.2} %", 100.0 * share)
 }
 
-fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).into()
-}
-
-fn compared(found: &Correlation) -> CertificateSection {
+fn compared(found: &Correlation) -> Section {
     let facts = |of: &dyn Fn(&SurfaceFacts) -> String| found.surfaces.each_ref().map(of);
     let corner = |extent: &[f64; 4]| format!("{},{} to {},{}", extent[0], extent[1], extent[2], extent[3]);
     let unknown = |text: &str| if text.is_empty() { "unknown".into() } else { text.to_owned() };
@@ -72,9 +68,9 @@ fn compared(found: &Correlation) -> CertificateSection {
         ("BLAKE3", facts(&|surface| surface.fingerprint.clone())),
     ];
     // A fingerprint is wider than half a terminal: each surface has lines of its own.
-    let mut rows = Vec::new();
+    let mut table = Table::default().words(["", "", ""]);
     for (which, letter) in [(0, "A"), (1, "B")] {
-        rows.extend(all.iter().map(|(name, both)| row([letter, name, &both[which]])));
+        all.iter().for_each(|(name, both)| table.row([letter, name, &both[which]]));
     }
     let [west, south, east, north] = found.common_m;
     let (wide, high) = ((east - west) / 1000.0, (north - south) / 1000.0);
@@ -82,17 +78,16 @@ fn compared(found: &Correlation) -> CertificateSection {
     sentences.extend(found.notes.iter().map(|note| format!("Note: {note}.")));
     let explained = "The fingerprint of a database is that of its database.json, which names those of all its files: \
                      databases with the same one are the same to the last bit.";
-    CertificateSection {
+    Section {
         title: "What was compared".into(),
         sentences,
-        head: row(["", "", ""]),
-        rows,
-        is_of_texts: true,
+        table,
         explained: vec![explained.into()],
+        ..Section::default()
     }
 }
 
-fn plan(found: &Correlation) -> CertificateSection {
+fn plan(found: &Correlation) -> Section {
     let (request, plan) = (&found.request, found.plan);
     let rows = [
         ("share that has to agree", percent(request.demand.share)),
@@ -104,21 +99,19 @@ fn plan(found: &Correlation) -> CertificateSection {
         ("objects in lines of sight", places::standing_word(found.standing).into()),
         ("program", format!("tiefort {}", env!("CARGO_PKG_VERSION"))),
     ];
+    let mut table = Table::default().words([""]).figures([""]);
+    rows.into_iter().for_each(|(name, value)| table.row([name.to_owned(), value]));
     let explained = "Acceptance sampling, exact for the binomial distribution: if a smaller share than the one asked \
                      for agreed, more places than may fail would fail, but for the risk. Unless a number of places \
                      was asked for, it is the smallest one with which surfaces of which half as much fails are \
                      refused with no larger a risk.";
-    CertificateSection {
-        title: "The plan".into(),
-        head: row(["", ""]),
-        rows: rows.into_iter().map(|(name, value)| vec![name.into(), value]).collect(),
-        explained: vec![explained.into()],
-        ..CertificateSection::default()
-    }
+    Section { title: "The plan".into(), table, explained: vec![explained.into()], ..Section::default() }
 }
 
-fn criteria(found: &Correlation) -> CertificateSection {
-    let rows = found.criteria.iter().map(|criterion| {
+fn criteria(found: &Correlation) -> Section {
+    let mut table = Table::default().words(["criterion"]);
+    table = table.figures(["failed", "may fail", "agree", "95 % interval", ""]);
+    for criterion in &found.criteria {
         let (agreement, interval) = match criterion.agreement() {
             Some((share, [low, high])) => {
                 (found_percent(share), format!("{:.2} to {:.2} %", 100.0 * low, 100.0 * high))
@@ -128,8 +121,8 @@ fn criteria(found: &Correlation) -> CertificateSection {
         let most = criterion.failures_max.map_or("-".into(), grouped);
         let failed = format!("{} of {}", grouped(criterion.failures), grouped(criterion.samples));
         let accepted = if criterion.is_accepted() { "accepted" } else { "not accepted" };
-        vec![criterion.name.clone(), failed, most, agreement, interval, accepted.into()]
-    });
+        table.row([criterion.name.clone(), failed, most, agreement, interval, accepted.into()]);
+    }
     let where_agree = found.criteria.iter().map(|criterion| format!("{}: {}.", criterion.name, criterion.agrees_where));
     let mut sentences = Vec::new();
     if 1 < found.causes.len() || (found.is_accepted() && !found.causes.is_empty()) {
@@ -152,14 +145,7 @@ fn criteria(found: &Correlation) -> CertificateSection {
     let mut explained = vec!["A place, or a pair of places, agrees where:".to_owned()];
     explained.extend(where_agree);
     explained.push("The interval holds the share of all that agrees with 95 % (Clopper and Pearson).".into());
-    CertificateSection {
-        title: "What is accepted".into(),
-        sentences,
-        head: row(["criterion", "failed", "may fail", "agree", "95 % interval", ""]),
-        rows: rows.collect(),
-        explained,
-        is_of_texts: false,
-    }
+    Section { title: "What is accepted".into(), sentences, table, explained, ..Section::default() }
 }
 
 fn height_cells(figures: &HeightFigures) -> [String; 7] {
@@ -168,11 +154,11 @@ fn height_cells(figures: &HeightFigures) -> [String; 7] {
     [metres(figures.mean_m), metres(figures.rms_m), p50, p90, p95, p99, metres(figures.largest_m)]
 }
 
-fn heights(found: &Correlation) -> CertificateSection {
+fn heights(found: &Correlation) -> Section {
     let figures = &found.heights;
     if figures.places == 0 {
         let sentences = vec!["No place has a height in both.".into()];
-        return CertificateSection { title: "Heights".into(), sentences, ..CertificateSection::default() };
+        return Section { title: "Heights".into(), sentences, ..Section::default() };
     }
     let [east, north] = figures.largest_at_m;
     let largest = match figures.largest_m == 0.0 {
@@ -180,25 +166,26 @@ fn heights(found: &Correlation) -> CertificateSection {
         false => format!("; the largest at {east:.1},{north:.1}"),
     };
     let sentence = format!("Height of B less that of A, in metres, at {} places{largest}.", grouped(figures.places));
-    CertificateSection {
+    let mut table = Table::default().words(["mean"]).figures(["RMS", "50 %", "90 %", "95 %", "99 %", "largest"]);
+    table.row(height_cells(figures));
+    Section {
         title: "Heights".into(),
         sentences: vec![sentence],
-        head: row(["mean", "RMS", "50 %", "90 %", "95 %", "99 %", "largest"]),
-        rows: vec![height_cells(figures).into()],
+        table,
         explained: vec![
             "A mean far from 0 is a difference of datums or units; an RMS far above the mean is another shape. Of 100 \
              places, 95 differ by no more than the figure below 95 %."
                 .into(),
         ],
-        ..CertificateSection::default()
+        ..Section::default()
     }
 }
 
-fn shift(found: &Correlation) -> CertificateSection {
+fn shift(found: &Correlation) -> Section {
     let title = "Best shift".into();
     let Some(shift) = &found.shift else {
         let sentences = vec!["Too few places have heights and slopes in both.".into()];
-        return CertificateSection { title, sentences, ..CertificateSection::default() };
+        return Section { title, sentences, ..Section::default() };
     };
     let [east, north, up] = [0, 1, 2].map(|axis| {
         if axis < 2 && !shift.is_level_told {
@@ -212,17 +199,18 @@ fn shift(found: &Correlation) -> CertificateSection {
         sentences.push("The ground is too flat, or too even, to tell a move to a side.".into());
     }
     let [before, after] = shift.rms_m.map(|metres| format!("{metres:.2}"));
-    CertificateSection {
+    let mut table = Table::default().words(["east"]).figures(["north", "up", "RMS before", "RMS after"]);
+    table.row([east, north, up, before, after]);
+    Section {
         title,
         sentences,
-        head: row(["east", "north", "up", "RMS before", "RMS after"]),
-        rows: vec![vec![east, north, up, before, after]],
+        table,
         explained: vec![
             "Half a post to a side is where one takes posts for areas; some metres up another vertical datum. It is \
              told as a cause from a tenth of a post, and from a tenth of what heights may differ by."
                 .into(),
         ],
-        is_of_texts: false,
+        ..Section::default()
     }
 }
 
@@ -238,7 +226,7 @@ fn kappa_text<const N: usize>(table: &Confusion<N>) -> String {
     }
 }
 
-fn slopes(found: &Correlation) -> CertificateSection {
+fn slopes(found: &Correlation) -> Section {
     let figures = &found.slopes;
     let name = |class: usize| match class {
         0 => format!("0-{}", SLOPE_ENDS_DEGREES[0]),
@@ -247,16 +235,13 @@ fn slopes(found: &Correlation) -> CertificateSection {
         }
         class => format!("{}+", SLOPE_ENDS_DEGREES[class - 1]),
     };
-    let head = std::iter::once("A, degrees".to_owned());
-    let head = head.chain((0..SLOPE_CLASSES).map(|class| format!("B {}", name(class))));
-    let rows = figures
-        .classes
-        .0
-        .iter()
-        .enumerate()
-        .map(|(class, row)| std::iter::once(name(class)).chain(row.iter().map(|&count| grouped(count))).collect());
+    let mut table = Table::default().words(["A, degrees"]);
+    table = table.figures((0..SLOPE_CLASSES).map(|class| format!("B {}", name(class))));
+    for (class, row) in figures.classes.0.iter().enumerate() {
+        table.add([name(class)], row.map(grouped));
+    }
     let agree = figures.classes.agreeing() as f64 / figures.classes.total().max(1) as f64;
-    CertificateSection {
+    Section {
         title: "Slopes".into(),
         sentences: vec![format!(
             "Places with a slope on both by its class, taken over {} m: {} in the same class, {}; RMS difference \
@@ -266,26 +251,27 @@ fn slopes(found: &Correlation) -> CertificateSection {
             kappa_text(&figures.classes),
             figures.rms_degrees
         )],
-        head: head.collect(),
-        rows: rows.collect(),
+        table,
         explained: vec![
             "Rows are classes of A, columns those of B. Places below the diagonal are gentler on B: what stops a \
              vehicle on A does not on B."
                 .into(),
         ],
-        is_of_texts: false,
+        ..Section::default()
     }
 }
 
-fn sights(found: &Correlation) -> CertificateSection {
-    let rows = found.sights.iter().map(|sight| {
+fn sights(found: &Correlation) -> Section {
+    let mut table = Table::default().words(["height"]);
+    table = table.figures(["both see", "neither", "only A", "only B", "agree", "kappa, 95 % interval"]);
+    for sight in &found.sights {
         let [[neither, b_only], [a_only, both]] = sight.pairs.0.map(|row| row.map(grouped));
         let agree = sight.pairs.agreeing() as f64 / sight.pairs.total().max(1) as f64;
         let kappa = sight.pairs.kappa().map_or("undefined".into(), |kappa| {
             format!("{:.3} ({:.3} to {:.3})", kappa.kappa, kappa.interval[0], kappa.interval[1])
         });
-        vec![format!("{} m", sight.above_m), both, neither, a_only, b_only, found_percent(agree), kappa]
-    });
+        table.row([format!("{} m", sight.above_m), both, neither, a_only, b_only, found_percent(agree), kappa]);
+    }
     let mut sentences = vec!["Pairs of places that see each other, both as high above the ground.".to_owned()];
     if found.only_one_pairs != [0; 2] {
         sentences.push("Those over a hole of one surface agree in nothing, and are not among these.".into());
@@ -293,33 +279,33 @@ fn sights(found: &Correlation) -> CertificateSection {
     if found.sights.iter().any(|sight| sight.pairs.kappa().is_none()) {
         sentences.push("Kappa is undefined where every pair is seen on both, or hidden on both.".into());
     }
-    CertificateSection {
+    Section {
         title: "Lines of sight".into(),
         sentences,
-        head: row(["height", "both see", "neither", "only A", "only B", "agree", "kappa, 95 % interval"]),
-        rows: rows.collect(),
+        table,
         explained: vec![
             "Kappa is agreement beyond chance: 1 where all pairs agree, 0 where no more do than if they were drawn. \
              Where only one side sees, one can fire at a target that does not see who fires: an unfair fight."
                 .into(),
         ],
-        is_of_texts: false,
+        ..Section::default()
     }
 }
 
-fn classes(found: &Correlation) -> CertificateSection {
-    let rows = found.classes.iter().map(|class| {
+fn classes(found: &Correlation) -> Section {
+    let mut table = Table::default().words(["class"]);
+    table = table.figures(["places", "agree", "mean", "RMS", "95 %", "largest"]);
+    for class in &found.classes {
         let figures = &class.heights;
         let agree = figures.within as f64 / figures.places.max(1) as f64;
         let [mean, rms, _, _, p95, _, largest] = height_cells(figures);
-        vec![class.name.clone(), grouped(figures.places), found_percent(agree), mean, rms, p95, largest]
-    });
-    CertificateSection {
+        table.row([class.name.clone(), grouped(figures.places), found_percent(agree), mean, rms, p95, largest]);
+    }
+    Section {
         title: "By class of ground".into(),
         sentences: vec!["Heights as above, by the class that the ground has in A.".into()],
-        head: row(["class", "places", "agree", "mean", "RMS", "95 %", "largest"]),
-        rows: rows.collect(),
-        ..CertificateSection::default()
+        table,
+        ..Section::default()
     }
 }
 

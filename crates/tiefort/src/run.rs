@@ -9,7 +9,7 @@ use job::Job;
 use serde_json::json;
 use store::Report;
 use store::engine::Lease;
-use views::{Align, Table, grouped, leading, stage_table};
+use views::{Align, Table, grouped, leading, stages_text};
 
 use crate::arguments::{Log, RunArguments};
 use crate::clock::SystemClock;
@@ -242,7 +242,7 @@ struct End<'a> {
 
 /// The end table: whole lines.
 fn end_table(end: &End) -> String {
-    let stages = stage_table(&end.report.stages, end.report.workers).text(0);
+    let stages = stages_text(&end.report.stages, end.report.workers);
     let mut text = format!("\n{stages}\n");
     text += &findings(end.report).text(0);
     text += "\n";

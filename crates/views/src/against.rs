@@ -1,9 +1,6 @@
-//! What a report says in words: residuals, each with what it is measured against, and buildings, walls and woods.
+//! Residuals of the whole area, each with what it is measured against.
 
-use Align::{Left, Right};
-use store::{ObjectSums, Report, ReportObjects, ReportResidual};
-
-use super::table::{Align, Table, grouped};
+use store::{Report, ReportResidual};
 
 /// Residuals in metres; outside features the root mean square and the largest are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,21 +11,24 @@ pub(crate) struct Residual {
     pub rest: Option<[f64; 3]>,
 }
 
+impl From<ReportResidual> for Residual {
+    fn from(residual: ReportResidual) -> Self {
+        let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = residual;
+        Self { rms_m, max_m, rest: Some([mean_abs_m, p95_m, p99_m]) }
+    }
+}
+
 /// Residuals of the whole area against what they say. Those that a build did not measure are absent.
 pub(crate) fn told(report: &Report) -> Vec<(&'static str, Residual)> {
-    let whole = |residual: ReportResidual| {
-        let ReportResidual { rms_m, max_m, mean_abs_m, p95_m, p99_m } = residual;
-        Residual { rms_m, max_m, rest: Some([mean_abs_m, p95_m, p99_m]) }
-    };
     let outside = report.features.as_ref().map(|features| {
         let checks = &features.checks;
         Residual { rms_m: checks.outside_rms_m, max_m: checks.outside_max_m, rest: None }
     });
     let all = [
-        (OWN, report.residual_against_source.map(whole)),
-        (GRID, report.residual_against_source_grid.map(whole)),
+        (OWN, report.residual_against_source.map(Residual::from)),
+        (GRID, report.residual_against_source_grid.map(Residual::from)),
         ("ground outside features", outside),
-        (WORKING, Some(whole(report.residual))),
+        (WORKING, Some(report.residual.into())),
     ];
     all.into_iter().filter_map(|(words, residual)| Some((words, residual?))).collect()
 }
@@ -42,42 +42,14 @@ pub fn leading(report: &Report) -> (&'static str, ReportResidual) {
     largest.unwrap_or((WORKING, report.residual))
 }
 
-pub(crate) const WORKING: &str = "working ground";
+const WORKING: &str = "working ground";
 const GRID: &str = "source at the grid's posts";
 const OWN: &str = "source at its own posts";
-
-/// Kind, kept and wanted in number, in square metres of silhouette, and the share in per cent.
-pub(crate) fn objects_row(sums: &ObjectSums) -> [String; 6] {
-    let share = if 0.0 < sums.wanted_m2 { format!("{:.1}", 100.0 * sums.kept_m2 / sums.wanted_m2) } else { "-".into() };
-    let [kept_m2, wanted_m2] = [sums.kept_m2, sums.wanted_m2].map(|square| grouped(square.round() as u64));
-    [sums.kind.clone(), grouped(sums.kept), grouped(sums.wanted), kept_m2, wanted_m2, share]
-}
-
-/// The block of the text report.
-pub(crate) fn objects_text(objects: &ReportObjects) -> String {
-    let mut table = Table::new(&[Left, Right, Right, Right, Right, Right]);
-    table.row(["Objects", "kept", "of", "m2 seen", "of", "%"]);
-    for [kind, numbers @ ..] in objects.kinds.iter().map(objects_row) {
-        table.row([format!("  {kind}")].into_iter().chain(numbers));
-    }
-    let of = |found: store::ReportObjectLimit| format!("{} of {}", grouped(found.max), grouped(found.limit));
-    format!(
-        "{}  {} roofs, walls and triangles of woods; {} in one load module at most, {} in 4 km\n  {} had no room, \
-         {} remarks; objects.geojson\n",
-        table.text(0),
-        grouped(objects.polygons),
-        of(objects.per_load_module),
-        of(objects.per_4km),
-        grouped(objects.left_out),
-        grouped(objects.remarks)
-    )
-}
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::samples;
-    use store::ReportObjectLimit;
 
     #[test]
     fn the_source_leads_with_the_larger_of_its_two_figures() {
@@ -94,24 +66,5 @@ mod tests {
         let report = Report { features: Some(samples::features()), ..samples::report() };
         let rms_m: Vec<f64> = told(&report).iter().map(|(_, residual)| residual.rms_m).collect();
         assert_eq!(rms_m, [3.1, 2.9, 1.25, 2.999]);
-    }
-
-    #[test]
-    fn what_is_kept_of_what_was_wanted_is_told_by_kind() {
-        let sums =
-            ObjectSums { kind: "building".into(), wanted: 1_200, kept: 1_150, wanted_m2: 90_000.4, kept_m2: 88_000.0 };
-        let limit = ReportObjectLimit { max: 390, limit: 400 };
-        let objects = ReportObjects {
-            kinds: vec![sums],
-            polygons: 6_000,
-            per_load_module: limit,
-            per_4km: limit,
-            left_out: 50,
-            remarks: 3,
-        };
-        let text = objects_text(&objects);
-        assert!(text.contains("building  1,150  1,200   88,000  90,000  97.8"), "{text}");
-        assert!(text.contains("390 of 400 in one load module"), "{text}");
-        assert!(text.contains("50 had no room, 3 remarks"), "{text}");
     }
 }

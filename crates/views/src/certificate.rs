@@ -6,9 +6,10 @@ use std::fmt::Write;
 use maud::{Markup, PreEscaped, html};
 use serde_json::Value;
 
-use crate::page::{document, table};
+use crate::page::{Marks, body, document};
 use crate::picture::palette;
-use crate::table::{Align, Table, fold};
+use crate::section::Section;
+use crate::table::fold;
 
 /// What a certificate says.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,26 +19,9 @@ pub struct Certificate {
     /// The result in a sentence, and whether it is a good one.
     pub verdict: (bool, String),
     /// Its parts, in the order of reading.
-    pub sections: Vec<CertificateSection>,
+    pub sections: Vec<Section>,
     /// Where two surfaces differ.
     pub map: Option<CertificateMap>,
-}
-
-/// A part of a certificate.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct CertificateSection {
-    /// What stands above it.
-    pub title: String,
-    /// Sentences before its table.
-    pub sentences: Vec<String>,
-    /// Heads of columns; none without a table.
-    pub head: Vec<String>,
-    /// Rows of the table. The first column holds names, every other one figures, or texts where `is_of_texts`.
-    pub rows: Vec<Vec<String>>,
-    /// Whether every column of the table holds texts.
-    pub is_of_texts: bool,
-    /// Sentences for a page alone: how the figures are read.
-    pub explained: Vec<String>,
 }
 
 /// Values over squares of an area.
@@ -59,23 +43,8 @@ pub struct CertificateMap {
 
 /// The certificate for a terminal.
 pub fn certificate_text(certificate: &Certificate) -> String {
-    let mut text = format!("{}\n", certificate.verdict.1);
-    for section in &certificate.sections {
-        let _ = write!(text, "\n{}\n", section.title);
-        section.sentences.iter().for_each(|sentence| text += &format!("  {sentence}\n"));
-        if !section.rows.is_empty() {
-            let others = if section.is_of_texts { Align::Left } else { Align::Right };
-            let columns: Vec<Align> =
-                (0..section.head.len()).map(|column| if column == 0 { Align::Left } else { others }).collect();
-            let mut table = Table::new(&columns);
-            if section.head.iter().any(|head| !head.is_empty()) {
-                table.row(section.head.iter());
-            }
-            section.rows.iter().for_each(|row| table.row(row.iter()));
-            text += &table.text(2);
-        }
-    }
-    fold(&text, 2)
+    let sections: String = certificate.sections.iter().map(|section| format!("\n{}", section.text())).collect();
+    fold(&format!("{}\n{sections}", certificate.verdict.1), 2)
 }
 
 /// The certificate as a page: one file that loads nothing and runs nothing.
@@ -84,28 +53,11 @@ pub fn certificate_html(certificate: &Certificate) -> String {
     let found = html! {
         div.verdict.breached[!is_good] { p { b { (verdict) } } }
         main {
-            @for section in sections { section { h2 { (section.title) } (body(section)) } }
+            @for section in sections { section { h2 { (section.title) } (body(section, &Marks::default())) } }
             @if let Some(map) = map { section { h2 { (map.title) } (picture(map)) } }
         }
     };
     document(title, &found)
-}
-
-fn body(section: &CertificateSection) -> Markup {
-    let is_figure = |column: usize| !section.is_of_texts && 0 < column;
-    html! {
-        @for sentence in &section.sentences { p { (sentence) } }
-        @if !section.rows.is_empty() {
-            (table(html! {
-                @for (column, head) in section.head.iter().enumerate() { th.n[is_figure(column)] { (head) } }
-            }, html! {
-                @for row in &section.rows {
-                    tr { @for (column, cell) in row.iter().enumerate() { td.n[is_figure(column)] { (cell) } } }
-                }
-            }))
-        }
-        @for sentence in &section.explained { p.quiet { (sentence) } }
-    }
 }
 
 /// Squares in the colours of residuals, north up.
@@ -147,15 +99,17 @@ fn picture(map: &CertificateMap) -> Markup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::Table;
 
     fn certificate() -> Certificate {
-        let section = CertificateSection {
+        let mut table = Table::default().words(["figure"]).figures(["m"]);
+        table.row(["RMS", "1.25"]);
+        let section = Section {
             title: "Heights".into(),
             sentences: vec!["Of <b> less A.".into()],
-            head: vec!["figure".into(), "m".into()],
-            rows: vec![vec!["RMS".into(), "1.25".into()]],
+            table,
             explained: vec!["The smaller, the better.".into()],
-            ..CertificateSection::default()
+            ..Section::default()
         };
         let map = CertificateMap {
             title: "Where they differ".into(),

@@ -10,11 +10,13 @@ mod against;
 pub use against::leading;
 mod map_files;
 pub use map_files::{BreachPlaces, breaches_csv, breaches_geojson, features_geojson, outcome};
-mod features_text;
-pub use features_text::{far_off_in_words, remarks_in_words};
+mod parts;
+pub use parts::{eta_in_words, remarks_in_words, stages_text};
+mod section;
+pub use section::Section;
 mod certificate;
 mod page;
-pub use certificate::{Certificate, CertificateMap, CertificateSection, certificate_html, certificate_text};
+pub use certificate::{Certificate, CertificateMap, certificate_html, certificate_text};
 pub use page::{Page, PageSetting, report_html};
 mod picture;
 pub use picture::{
@@ -23,9 +25,9 @@ pub use picture::{
     draw_map, draw_module_limits, draw_panels, draw_seen, draw_sight, palette,
 };
 mod table;
-pub use table::{Align, COLUMNS_MAX, Table, fold, grouped};
+pub use table::{Align, COLUMNS_MAX, Cell, Table, fold, grouped};
 mod report;
-pub use report::{eta_in_words, report_text, stage_table};
+pub use report::report_text;
 
 #[cfg(test)]
 mod samples;

@@ -1,4 +1,7 @@
-//! Columns that line up, without colour, and numbers a person can read; lines as wide as a terminal.
+//! Tables: what they hold, for text and page alike, and as columns that line up, without colour; numbers a person can
+//! read; lines as wide as a terminal.
+
+use store::ReportPlace;
 
 /// Columns of an ordinary terminal, and of a page printed from it: no line is wider, single words apart.
 pub const COLUMNS_MAX: usize = 80;
@@ -14,55 +17,198 @@ pub enum Align {
     Right,
 }
 
-/// Rows of cells; each column is as wide as its widest cell.
-#[derive(Clone, Debug)]
+/// What stands in one place of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cell {
+    /// Words, or a figure.
+    Plain(String),
+    /// What a person types or copies: a key, a path, a fingerprint.
+    Code(String),
+    /// Words, and the key of a job that they are about, which a page shows beside them.
+    Keyed(&'static str, &'static str),
+    /// Words of which there is too little, which stand out on a page.
+    Thin(String),
+    /// A place, which a page links to its map.
+    Place(ReportPlace),
+    /// A figure, and the share of a whole that it says, which a page draws as a bar.
+    Share(String, f64),
+}
+
+impl<T: Into<String>> From<T> for Cell {
+    fn from(text: T) -> Self {
+        Self::Plain(text.into())
+    }
+}
+
+impl Cell {
+    /// A load module, or the south-western one of a window, is its row and column: the kind of limit says which.
+    fn text(&self) -> String {
+        match self {
+            Self::Plain(text) | Self::Code(text) | Self::Thin(text) | Self::Share(text, _) => text.clone(),
+            Self::Keyed(words, _) => (*words).to_owned(),
+            Self::Place(ReportPlace::Module([row, col]) | ReportPlace::Window([row, col])) => format!("{row},{col}"),
+            Self::Place(ReportPlace::Area) => "area".to_owned(),
+        }
+    }
+}
+
+/// A column of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Column {
+    pub head: String,
+    pub align: Align,
+    /// Whether a terminal has no room for it.
+    pub is_for_page: bool,
+}
+
+/// How much of a long table is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Long {
+    rows_of_text: usize,
+    rows_of_page: usize,
+    /// The file that has them all.
+    file: &'static str,
+}
+
+/// Rows of cells, with a head where a column has one; each column is as wide as its widest cell.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    columns: Vec<Align>,
-    rows: Vec<Vec<String>>,
+    pub(crate) columns: Vec<Column>,
+    rows: Vec<Vec<Cell>>,
+    long: Option<Long>,
 }
 
 impl Table {
-    /// A table without rows.
+    /// A table without head and rows.
     pub fn new(columns: &[Align]) -> Self {
-        Self { columns: columns.to_vec(), rows: Vec::new() }
+        columns.iter().fold(Self::default(), |table, &align| table.with([""], align, false))
+    }
+
+    /// The table with columns of words under these heads after those that it has.
+    pub fn words<T: Into<String>>(self, heads: impl IntoIterator<Item = T>) -> Self {
+        self.with(heads, Align::Left, false)
+    }
+
+    /// The same with columns of figures.
+    pub fn figures<T: Into<String>>(self, heads: impl IntoIterator<Item = T>) -> Self {
+        self.with(heads, Align::Right, false)
+    }
+
+    /// The same with columns of figures that only a page has room for.
+    pub(crate) fn figures_of_page<const N: usize>(self, heads: [&str; N]) -> Self {
+        self.with(heads, Align::Right, true)
+    }
+
+    fn with<T: Into<String>>(mut self, heads: impl IntoIterator<Item = T>, align: Align, is_for_page: bool) -> Self {
+        let columns = heads.into_iter().map(|head| Column { head: head.into(), align, is_for_page });
+        self.columns.extend(columns);
+        self
+    }
+
+    /// The table of which a text and a page show so many rows; the rest is in `file`.
+    pub(crate) fn long(self, [rows_of_text, rows_of_page]: [usize; 2], file: &'static str) -> Self {
+        Self { long: Some(Long { rows_of_text, rows_of_page, file }), ..self }
     }
 
     /// Adds a row.
     ///
     /// # Panics
     /// When it has not one cell per column.
-    pub fn row<T: Into<String>>(&mut self, cells: impl IntoIterator<Item = T>) {
-        let cells: Vec<String> = cells.into_iter().map(Into::into).collect();
+    pub fn row<T: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = T>) {
+        let cells: Vec<Cell> = cells.into_iter().map(Into::into).collect();
         assert_eq!(cells.len(), self.columns.len(), "a row has one cell per column");
         self.rows.push(cells);
+    }
+
+    /// Adds a row that begins with these cells and goes on with these figures.
+    ///
+    /// # Panics
+    /// When it has not one cell per column.
+    pub fn add<T: Into<Cell>, U: Into<Cell>>(
+        &mut self,
+        first: impl IntoIterator<Item = T>,
+        figures: impl IntoIterator<Item = U>,
+    ) {
+        self.row(first.into_iter().map(Into::into).chain(figures.into_iter().map(Into::into)));
+    }
+
+    /// Whether no column has a head.
+    fn is_headless(&self) -> bool {
+        self.columns.iter().all(|column| column.head.is_empty())
+    }
+
+    /// Whether there is nothing to show.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Rows that a page shows, and what it says of the rest.
+    pub(crate) fn of_page(&self) -> (&[Vec<Cell>], Option<String>) {
+        self.shown(self.long.map(|long| long.rows_of_page))
+    }
+
+    fn shown(&self, rows_max: Option<usize>) -> (&[Vec<Cell>], Option<String>) {
+        let shown = self.rows.len().min(rows_max.unwrap_or(usize::MAX));
+        let rest = self.rows.len() - shown;
+        let rest = self.long.filter(|_| 0 < rest).map(|Long { file, .. }| {
+            let rest = grouped(rest as u64);
+            format!("and {rest} more in {file}")
+        });
+        (&self.rows[..shown], rest)
     }
 
     /// The lines, each with `indent` spaces before it and none at its end. A text in the last column that would end
     /// beyond [`COLUMNS_MAX`] goes on below itself.
     pub fn text(&self, indent: usize) -> String {
-        let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        let before = indent + widths.iter().rev().skip(1).map(|width| width + 2).sum::<usize>();
-        // Where the other columns leave too little, it is read under them.
-        let hang = if before + CELL_COLUMNS_MIN <= COLUMNS_MAX { before } else { indent + 4 };
-        let mut text = String::new();
-        for row in &self.rows {
-            let cells = row.iter().zip(&self.columns).zip(&widths);
-            let mut cells: Vec<String> = cells.map(|((cell, align), &width)| pad(cell, *align, width)).collect();
-            let mut line = " ".repeat(indent);
-            if self.columns.last() == Some(&Align::Left)
-                && let Some(last) = cells.pop()
-            {
-                line += &cells.iter().map(|cell| format!("{cell}  ")).collect::<String>();
-                line = fill(line, last.trim_end(), hang);
-            } else {
-                line += &cells.join("  ");
-            }
-            text += line.trim_end();
-            text.push('\n');
+        self.lines(indent, "")
+    }
+
+    /// The same with all rows two columns to the right of their head, as what stands below a title.
+    pub(crate) fn text_below_head(&self) -> String {
+        self.lines(0, "  ")
+    }
+
+    fn lines(&self, indent: usize, before_rows: &str) -> String {
+        let columns = || self.columns.iter().enumerate().filter(|(_, column)| !column.is_for_page);
+        let aligns: Vec<Align> = columns().map(|(_, column)| column.align).collect();
+        let (shown, rest) = self.shown(self.long.map(|long| long.rows_of_text));
+        let head = columns().map(|(_, column)| column.head.clone()).collect();
+        let mut rows: Vec<Vec<String>> = Vec::from_iter((!self.is_headless()).then_some(head));
+        for row in shown {
+            let mut cells: Vec<String> = columns().map(|(index, _)| row[index].text()).collect();
+            cells[0].insert_str(0, before_rows);
+            rows.push(cells);
         }
+        let mut text = lined_up(&aligns, &rows, indent);
+        text.extend(rest.map(|rest| format!("{}{before_rows}{rest}\n", " ".repeat(indent))));
         text
     }
+}
+
+/// The lines of rows whose columns line up.
+fn lined_up(aligns: &[Align], rows: &[Vec<String>], indent: usize) -> String {
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..aligns.len()).map(width).collect();
+    let before = indent + widths.iter().rev().skip(1).map(|width| width + 2).sum::<usize>();
+    // Where the other columns leave too little, it is read under them.
+    let hang = if before + CELL_COLUMNS_MIN <= COLUMNS_MAX { before } else { indent + 4 };
+    let mut text = String::new();
+    for row in rows {
+        let cells = row.iter().zip(aligns).zip(&widths);
+        let mut cells: Vec<String> = cells.map(|((cell, align), &width)| pad(cell, *align, width)).collect();
+        let mut line = " ".repeat(indent);
+        if aligns.last() == Some(&Align::Left)
+            && let Some(last) = cells.pop()
+        {
+            line += &cells.iter().map(|cell| format!("{cell}  ")).collect::<String>();
+            line = fill(line, last.trim_end(), hang);
+        } else {
+            line += &cells.join("  ");
+        }
+        text += line.trim_end();
+        text.push('\n');
+    }
+    text
 }
 
 /// `text` with every line that is wider than [`COLUMNS_MAX`] broken between words; what follows stands `hang` columns
@@ -147,6 +293,16 @@ pub fn grouped(number: u64) -> String {
         text.push(digit);
     }
     text
+}
+
+/// Figures with so many digits behind the point.
+pub(crate) fn decimals<const N: usize>(all: [(f64, usize); N]) -> [String; N] {
+    all.map(|(figure, digits)| format!("{figure:.digits$}"))
+}
+
+/// A share of a whole in per cent, with so many digits behind the point.
+pub(crate) fn percent(part: f64, whole: f64, digits: usize) -> String {
+    if 0.0 < whole { format!("{:.digits$}", 100.0 * part / whole) } else { "-".into() }
 }
 
 #[cfg(test)]

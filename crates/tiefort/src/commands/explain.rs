@@ -147,10 +147,13 @@ fn features_text(features: &ExplainedFeatures) -> String {
         table.row([class, "", &format!("{} m3 cut, {} m3 filled", cubic(*cut), cubic(*fill))]);
     }
     for far in features.far_off.iter().take(REMARKS_MAX) {
+        let ([east, north], off_m) = (far.at_m, far.off_m.abs());
+        let what = if far.off_m < 0.0 { "cut" } else { "fill" };
+        let (feature, cause) = (&far.feature, far.cause.name());
         table.row([
             "off the ground",
             "",
-            &views::far_off_in_words(&far.feature, far.at_m, far.off_m, far.cause.name()),
+            &format!("{feature}: {what} of {off_m:.1} m at {east:.0} {north:.0}, {cause}"),
         ]);
     }
     for remark in features.remarks.iter().take(REMARKS_MAX) {

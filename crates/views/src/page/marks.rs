@@ -3,29 +3,25 @@
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
-use store::{Report, ReportPlace};
+use store::ReportPlace;
 use terrain::{ModuleId, ModuleRect};
 
 use super::place_text;
+use crate::parts::Part;
 use crate::picture::Scene;
-
-/// Rows of a long list that the page shows; the files beside it have them all.
-pub(super) const ROWS_MAX: usize = 100;
-/// The same of places where limits kept posts out.
-pub(super) const BOUND_ROWS_MAX: usize = 25;
+use crate::table::Cell;
 
 /// Places that the page links to its first map: name of the mark, and the load modules it lies over.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Marks(BTreeSet<(String, [u32; 4])>);
+pub(crate) struct Marks(BTreeSet<(String, [u32; 4])>);
 
 impl Marks {
-    /// Those of the tables, as far as they show them, and of these load modules; none without a scene to draw.
-    pub fn of(report: &Report, scene: Option<&Scene>, worst: &[ModuleId]) -> Self {
+    /// Those of tables, as far as these are shown, and of these load modules; none without a scene to draw.
+    pub fn of(parts: &[Part], scene: Option<&Scene>, worst: &[ModuleId]) -> Self {
         let Some(scene) = scene else { return Self::default() };
-        let bound = report.bound.iter().take(BOUND_ROWS_MAX).map(|bound| bound.place);
-        let breaches = report.breaches.iter().take(ROWS_MAX).map(|breach| breach.place);
-        let worst = worst.iter().map(|module| ReportPlace::Module([module.row, module.col]));
-        let places = bound.chain(breaches).chain(worst);
+        let rows = parts.iter().flat_map(|part| &part.sections).flat_map(|section| section.table.of_page().0);
+        let places = rows.flatten().filter_map(|cell| if let Cell::Place(place) = cell { Some(*place) } else { None });
+        let places = places.chain(worst.iter().map(|module| ReportPlace::Module([module.row, module.col])));
         let mark = |place| {
             let id = mark_id(place)?;
             let ([row, col], [high, wide]) = match place {

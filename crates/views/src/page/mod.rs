@@ -2,38 +2,31 @@
 //!
 //! It loads nothing: style, charts and pictures are inside. Nothing of it runs.
 
+mod about;
 mod advice;
 mod charts;
 mod maps;
 mod marks;
-mod tables;
+mod section;
 
+pub use about::PageSetting;
 pub(crate) use advice::advise;
 pub(crate) use advice::place_text;
-pub(crate) use tables::table;
+pub(crate) use marks::Marks;
+pub(crate) use section::body;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use store::{Manifest, Report};
 use terrain::{Each, LoadModule, ModuleId};
 
 use crate::against::leading;
+use crate::parts::{Part, parts};
 use crate::picture::{RESIDUAL_SCALE_M, Scene};
+use crate::section::Section;
 use crate::table::grouped;
 
 use charts::Histogram;
 use maps::{Figure, Figures};
-use marks::Marks;
-
-/// One setting of a job, as the page lists it.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PageSetting {
-    /// The key with its section.
-    pub key: String,
-    /// The value as the job file writes it.
-    pub value: String,
-    /// What it means.
-    pub meaning: String,
-}
 
 /// What the page is made from.
 #[derive(Clone, Copy, Debug)]
@@ -58,57 +51,90 @@ const WORST_COUNT: usize = 10;
 /// The whole page; `each` draws its maps one beside the other.
 pub fn report_html(page: &Page, each: Each) -> String {
     let Page { report, manifest, .. } = page;
+    let parts = parts(report);
     let worst_modules = page.scene.map(worst_modules).unwrap_or_default();
     let worst_ids: Vec<ModuleId> = worst_modules.iter().map(|module| module.id).collect();
-    let marks = &Marks::of(report, page.scene, &worst_ids);
+    let marks = &Marks::of(&parts, page.scene, &worst_ids);
     let figures = page.scene.map(|scene| Figures::of(report, scene, marks, each));
-    let figure = |figure: Figure| figures.as_ref().map(|figures| figures.get(figure));
+    let chapters = chapters(page, &parts, marks, figures.as_ref(), &worst_modules);
     let title = page.title.map_or_else(|| format!("Gaming area {}", report.area), str::to_owned);
     let body = html! {
         p.quiet { @if page.title.is_some() { "Gaming area " (report.area) ": " } (what_it_is(manifest)) }
         div.first[page.scene.is_some()] {
-            @if let Some(first) = figure(Figure::First) { div { (first) } }
+            @if let Some(figures) = &figures { div { (figures.get(Figure::First)) } }
             div {
-                (tables::verdict(report))
-                @if let Some(features) = &report.features { (tables::in_the_ground(features)) }
+                (about::verdict(report))
+                @if let Some(features) = &report.features { (about::in_the_ground(features)) }
                 (headline(page))
-                nav {
-                    @for (id, name) in sections(page) { a href={ "#" (id) } { (name) } }
-                }
+                nav { @for chapter in &chapters { a href={ "#" (chapter.id) } { (chapter.name) } } }
             }
         }
         main {
-            section id="limits" { h2 { "Limits" } (tables::limits(report, marks)) (tables::advice(report)) }
-            section id="residuals" {
-                h2 { "Residuals" } (tables::residuals(report)) (tables::levels(report)) (histograms(page))
+            @for Chapter { id, title, is_whole, body, .. } in &chapters {
+                section.whole[*is_whole] id=(id) { h2 { (title) } (body) }
             }
-            @if let Some(features) = &report.features {
-                section id="features" {
-                    h2 { "Roads and water" } (tables::features(features))
-                    @if let Some(map) = figure(Figure::Features) { (map) }
-                }
-            }
-            @if let Some(objects) = &report.objects {
-                section id="objects" {
-                    h2 { "Buildings and woods" } (tables::objects(objects))
-                    @if let (None, Some(map)) = (&report.features, figure(Figure::Features)) { (map) }
-                }
-            }
-            @match page.scene.zip(figures.as_ref()) {
-                Some((scene, figures)) => {
-                    section.whole id="maps" { h2 { "Maps" } (figures.maps()) }
-                    section.whole id="worst" {
-                        h2 { "The worst load modules" } (worst(page, scene, &worst_modules, marks))
-                    }
-                }
-                None => section id="maps" { h2 { "Maps" } (without_maps()) }
-            }
-            section id="breaches" { h2 { "Breaches" } (tables::breaches(report, marks)) }
-            section id="times" { h2 { "Times" } (tables::stages(report)) }
-            section id="made-from" { h2 { "Made from" } (tables::sources(manifest)) (settings(page)) }
         }
     };
     document(&title, &body)
+}
+
+/// A chapter of the page, to which its beginning links.
+struct Chapter<'a> {
+    id: &'static str,
+    /// What the link says.
+    name: &'static str,
+    /// What stands above it.
+    title: &'a str,
+    is_whole: bool,
+    body: Markup,
+}
+
+/// Parts of the report with what only a page has of them, and in between what lies on maps.
+fn chapters<'a>(
+    page: &Page,
+    parts: &'a [Part],
+    marks: &Marks,
+    figures: Option<&Figures>,
+    worst: &[&LoadModule],
+) -> Vec<Chapter<'a>> {
+    let chapter = |id, name, is_whole, body| Chapter { id, name, title: name, is_whole, body };
+    let mut chapters = Vec::new();
+    for Part { id, name, sections } in parts {
+        let ways = || html! { @if let Some(figures) = figures { (figures.get(Figure::Features)) } };
+        let more = match *id {
+            "limits" => about::advice(page.report),
+            "residuals" => histograms(page),
+            "features" => ways(),
+            "objects" if page.report.features.is_none() => ways(),
+            _ => html! {},
+        };
+        if *id == "breaches" {
+            match page.scene.zip(figures) {
+                Some((scene, figures)) => {
+                    chapters.push(chapter("maps", "Maps", true, figures.maps()));
+                    let worst = worst_modules_of(page, scene, worst, marks);
+                    chapters.push(chapter("worst", "Worst load modules", true, worst));
+                }
+                None => chapters.push(chapter("maps", "Maps", false, without_maps())),
+            }
+        }
+        let title = if sections[0].title.is_empty() { name } else { sections[0].title.as_str() };
+        let body = html! { (in_sections(sections, marks)) (more) };
+        chapters.push(Chapter { title, ..chapter(id, name, false, body) });
+    }
+    let made_from = in_sections(&about::made_from(page.manifest, page.settings), marks);
+    chapters.push(chapter("made-from", "Made from", false, html! { div.stack { (made_from) } }));
+    chapters
+}
+
+/// Sections of a chapter, above which the title of the first stands.
+fn in_sections(sections: &[Section], marks: &Marks) -> Markup {
+    html! {
+        @for (at, section) in sections.iter().enumerate() {
+            @if 0 < at && !section.title.is_empty() { h3 { (section.title) } }
+            (body(section, marks))
+        }
+    }
 }
 
 /// One file that loads nothing and runs nothing, in the style of all pages.
@@ -127,30 +153,6 @@ pub(crate) fn document(title: &str, body: &Markup) -> String {
         }
     };
     page.into_string()
-}
-
-const SECTIONS: [(&str, &str); 9] = [
-    ("limits", "Limits"),
-    ("residuals", "Residuals"),
-    ("features", "Roads and water"),
-    ("objects", "Buildings and woods"),
-    ("maps", "Maps"),
-    ("worst", "Worst load modules"),
-    ("breaches", "Breaches"),
-    ("times", "Times"),
-    ("made-from", "Made from"),
-];
-
-/// Those that this page has.
-fn sections(page: &Page) -> impl Iterator<Item = (&'static str, &'static str)> {
-    let (has_scene, has_features) = (page.scene.is_some(), page.report.features.is_some());
-    let has_objects = page.report.objects.is_some();
-    SECTIONS.into_iter().filter(move |&(id, _)| match id {
-        "worst" => has_scene,
-        "features" => has_features,
-        "objects" => has_objects,
-        _ => true,
-    })
 }
 
 fn without_maps() -> Markup {
@@ -291,7 +293,7 @@ fn worst_modules<'a>(scene: &Scene<'a>) -> Vec<&'a LoadModule> {
     order
 }
 
-fn worst(page: &Page, scene: &Scene, modules: &[&LoadModule], marks: &Marks) -> Markup {
+fn worst_modules_of(page: &Page, scene: &Scene, modules: &[&LoadModule], marks: &Marks) -> Markup {
     let quanta = f64::from(terrain::QUANTA_PER_METRE);
     html! {
         p {
@@ -320,17 +322,6 @@ fn refused_text(report: &Report, module: ModuleId) -> String {
     let here = store::ReportPlace::Module([module.row, module.col]);
     let refused: u32 = report.bound.iter().filter(|bound| bound.place == here).map(|bound| bound.refused).sum();
     if refused == 0 { String::new() } else { format!(", {refused} posts refused") }
-}
-
-fn settings(page: &Page) -> Markup {
-    html! {
-        h3 { "Settings" }
-        div.stack { (tables::table(tables::heads(&["Key", "Value", "Meaning"], &[]), html! {
-            @for setting in page.settings {
-                tr { td { code { (setting.key) } } td { code { (setting.value) } } td { (setting.meaning) } }
-            }
-        })) }
-    }
 }
 
 #[cfg(test)]
