@@ -13,6 +13,7 @@ mod parameters;
 mod shifts;
 pub(crate) mod vertical;
 mod wkt;
+mod wkt_nodes;
 use datums::datum_of_system;
 pub(crate) use geokeys::GeoKeys;
 use system::Vertical;

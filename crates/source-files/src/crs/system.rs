@@ -4,7 +4,8 @@ use proj4rs::Proj;
 use proj4rs::transform::transform;
 
 use super::datums::datum_of_system;
-use super::{shifts, wkt};
+use super::shifts;
+use super::wkt_nodes::geographic_code;
 
 /// A coordinate reference system with everything needed to compute with it.
 #[derive(Clone)]
@@ -105,7 +106,8 @@ impl Crs {
                 "EPSG:{code}, whose angles are grads; bring it to degrees: gdalwarp or ogr2ogr -t_srs"
             ));
         }
-        let geographic = wkt::geographic_code(known.wkt);
+        let is_shifted = !NEAR_WGS84.iter().any(|datum| definition.contains(datum));
+        let geographic = if is_shifted { geographic_code(known.wkt) } else { None };
         let mut crs = Self::new(shifts::corrected(definition, code, geographic)?, format!("EPSG:{code}"), Some(code))?;
         crs.remark = crs.remark.map(|_| shifts::remark(geographic));
         let is_three_dimensional = known.wkt.contains("CS[ellipsoidal,3]");

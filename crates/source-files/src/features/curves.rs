@@ -66,7 +66,7 @@ impl Chords {
         for (from, to, is_first) in [(from, through, true), (through, to, false)] {
             let turned = turn(from, to);
             let count = (turned.abs() / most).ceil();
-            if !(count <= self.left as f64) {
+            if count.is_nan() || (self.left as f64) < count {
                 return Err(format!("arcs of more than {VERTICES_MAX} chords"));
             }
             let count = (count as usize).max(1);

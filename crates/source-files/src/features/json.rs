@@ -59,9 +59,9 @@ pub(super) fn read(store: &Store, wanted: &Wanted) -> Result<FeatureFile, Source
     placing.finish(None)
 }
 
-/// Whether each line, or what stands behind each mark between, is a feature of its own.
+/// Whether each line is a feature of its own.
 fn is_sequence(text: &str) -> bool {
-    let mut records = text.split(['\n', '\u{1e}']).map(str::trim).filter(|record| !record.is_empty());
+    let mut records = text.lines().map(str::trim).filter(|record| !record.is_empty());
     records.next().is_some_and(|first| Written::of(first).is_some()) && records.next().is_some()
 }
 
