@@ -203,7 +203,8 @@ pub const CARRIES: [Carries; 17] = [
     Carries {
         format: Format::Features,
         name: "features",
-        meaning: "A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, degraded or left out",
+        meaning: "A GeoPackage of roads, rivers and lakes as they are in the ground, and what was mended, \
+                  degraded or left out",
         extensions: &["gpkg"],
         classes: "an attribute",
         decks: "in the layer decks",
@@ -278,7 +279,8 @@ pub const CARRIES: [Carries; 17] = [
     Carries {
         format: Format::Usd,
         name: "usd",
-        meaning: "A folder of OpenUSD text: a file for each tile, with collision meshes, for Isaac Sim, Omniverse and Blender",
+        meaning: "A folder of OpenUSD text: a file for each tile, with collision meshes, for Isaac Sim, \
+                  Omniverse and Blender",
         classes: "subsets with materials",
         objects: "a prim each, with id and height",
         textures: "a picture for each tile",

@@ -64,8 +64,9 @@ pub(crate) fn passages(network: &Network) -> Vec<Passage> {
 /// Raises the ends of decks to the top of banks that sag before them, and with them the stations between.
 ///
 /// A DEM sags before the bridge begins where it falls more steeply than the way may even if its grade gives way: the
-/// deck then rests on the highest station up to `back` quanta behind its end from which the ground falls so, if the way
-/// runs on from there within its grade. A way that comes down a hillside within its grade, or a hillside without end, is no such bank.
+/// deck then rests on the highest station up to `back` quanta behind its end from which the ground falls so, if the
+/// way runs on from there within its grade. A way that comes down a hillside within its grade, or a hillside without
+/// end, is no such bank.
 pub(crate) fn raise_sagging_ends(network: &Network, ground: &mut [Option<i32>], back: i32) {
     let mut raised: Vec<(u32, i32)> = Vec::new();
     for passage in passages(network).iter().filter(|passage| passage.is_deck) {

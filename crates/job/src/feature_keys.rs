@@ -172,7 +172,7 @@ pub(crate) const OBJECT_LIMITS: &[Key] = &[
 ];
 
 pub(crate) const OBJECT_SOURCES: &[Key] = &[
-    Key::new("file", "OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON, or a raster of heights of leaves")
+    Key::new("file", "OpenStreetMap data as .pbf, GeoPackage, Shapefile, GeoJSON, GeoParquet, or heights of leaves")
         .form("the path of a file of polygons and lines, or of a raster")
         .example(SOURCE),
     layer("{ file = \"town.gpkg\", layer = \"houses\" }"),

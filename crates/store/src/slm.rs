@@ -282,8 +282,8 @@ pub(crate) fn decode_modules(path: &Path, bytes: &[u8]) -> Result<(TileModules, 
     Ok((tile, finest))
 }
 
-/// The load modules at every level, the finest first, in the file at `path` that has these bytes; the reader holds that each
-/// is sound.
+/// The load modules at every level, the finest first, in the file at `path` that has these bytes; the reader holds
+/// that each is sound.
 ///
 /// # Errors
 /// When the file is not as it was written.

@@ -131,7 +131,8 @@ impl Product {
         Ok(Self { manifest, job, grid, frame, tiles, part, modules, ground, features })
     }
 
-    /// The load modules of a part at the finest level, row by row from the south-west, and nothing else of the database.
+    /// The load modules of a part at the finest level, row by row from the south-west, and nothing else of the
+    /// database.
     ///
     /// # Errors
     /// When one is missing or damaged.

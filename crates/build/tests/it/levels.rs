@@ -206,6 +206,9 @@ fn levels_are_added_to_and_taken_from_an_area_without_refining_it() {
     let finest: Vec<LoadModule> = levels_of(&scene, "fresh").swap_remove(0);
     drop(without.build("area", 2));
     assert_same(&before, &without.product("area"), "levels taken away");
+    let apart = inspect::difference(&scene.path("fresh"), &without.path("area"), 1).unwrap().changed;
+    assert_eq!(apart.len(), 16, "levels are compared, too");
+    assert!(apart.iter().all(|module| module.differs == ["level 1", "level 2"] && module.apart_m == 0.0));
     let (mut again, folder) = (Vec::new(), Folder::new(without.path("area")));
     for at in [tile(0, 0), tile(0, 1), tile(1, 0), tile(1, 1)] {
         again.extend(folder.read_modules(&folder.manifest().unwrap(), at).unwrap().1);

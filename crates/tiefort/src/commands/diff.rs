@@ -19,7 +19,8 @@ Examples:
   tiefort diff before.tdb after.tdb --format json | jq '.changed[].module'
 
 \"apart\" is how far the two surfaces of the finest level lie apart at most, at
-posts of the working grid. Exit codes: 0 all load modules alike; 1 some differ; 2 nothing to compare.";
+posts of the working grid. Exit codes: 0 all load modules alike, at every level;
+1 some differ; 2 nothing to compare.";
 
 /// Arguments of `diff`.
 #[derive(Args)]

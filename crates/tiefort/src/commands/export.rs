@@ -229,7 +229,7 @@ fn check(arguments: &Arguments) -> Result<(), Failure> {
         if is_given(arguments) && !takes(carries) {
             let expected: Vec<&str> = CARRIES.iter().filter(|row| takes(row)).map(|row| row.name).collect();
             let expected = expected.join(", ");
-            let message = format!("found {given} with --format {}, expected a format of {expected}", carries.name);
+            let message = format!("found {given} with --format {}, expected one of {expected}", carries.name);
             return Err(Failure::new(message, "leave it out, or choose such a format"));
         }
     }

@@ -79,7 +79,8 @@ commands! {
     Profile(profile), "Measure the ground along a line";
     Explain(explain), "Explain one load module: what it holds, what was refused, what one more point would buy";
     Diff(diff), "List the load modules in which two databases differ, and by how much";
-    Correlate(correlate), "Certify how well two databases, or a database and a raster, agree: heights, slopes, lines of sight";
+    Correlate(correlate), "Certify how well two databases, or a database and a raster, agree: heights, slopes, \
+        lines of sight";
     Verify(verify), "Check every file and every load module of a database";
     Fidelity(fidelity), "Measure how true a database is: residuals, line of sight, slope";
     Export(export), "Write a database in another program's format: meshes, single load modules";

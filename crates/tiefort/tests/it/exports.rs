@@ -177,7 +177,7 @@ fn what_cannot_be_exported_is_refused() {
     refuses(&["heightmap", "--size", "1000", "--out", "new"], &["1000 samples", "505, 1009, 2017"]);
     refuses(&["heightmap", "--engine", "unity", "--size", "505", "--out", "new"], &["505 samples", "513"]);
     refuses(&["usd", "--engine", "unity", "--out", "new"], &["--engine"]);
-    refuses(&["usd", "--size", "256", "--out", "new"], &["--size", "heightmap and terrain-rgb"]);
+    refuses(&["usd", "--size", "256", "--out", "new"], &["--size", "expected one of terrain-rgb, heightmap"]);
     refuses(&["terrain-rgb", "--size", "505", "--out", "new.pmtiles"], &["505 pixels", "256 or 512"]);
     refuses(&["terrain-rgb", "--out", "new.png"], &["\"png\"", "\"mbtiles\" or \"pmtiles\""]);
     refuses(&["mbtiles", "--encoding", "terrarium", "--out", "new.mbtiles"], &["--encoding"]);
