@@ -247,8 +247,8 @@ def deck_cracks(database):
 
 
 def deck_ends(module, across, line):
-    """Vertices of edges of decks along a line between load modules: place along it and height. A deck that ends at it in
-    one corner has none."""
+    """Vertices of edges of decks along a line between load modules: place along it and height. A deck that ends at it
+    in one corner has none."""
     if not module.decks:
         return set()
     on, along = (module.decks.x, module.decks.y) if across else (module.decks.y, module.decks.x)
