@@ -11,7 +11,8 @@ use terrain::{
     Post, PostRect, TileId, Tin, Vertex, in_turn,
 };
 use tin::load_modules::{
-    ClipHeights, Layout, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, put_decks, stand,
+    ClipHeights, Layout, classify_natural, clip, concatenate, cut_decks, cut_lines, highest_in, lift_decks, put_decks,
+    stand,
 };
 
 use crate::ground::Window;
@@ -140,7 +141,11 @@ fn make(assembling: &Assembling, stamp: &Stamp) -> Result<(Assembled, Sums), Com
     let mut bare: Vec<Option<LoadModule>> = modules.iter().zip(&decks).map(bare).collect();
     for ((module, lines), ((decks, most), bridges)) in modules.iter_mut().zip(&lines).zip(&decks) {
         if !decks.is_empty() {
+            let before = module.triangles.len();
             put_decks(module, (decks, bridges), lines, is_of_features, *most);
+            if before < module.triangles.len() {
+                classify_natural(module, &layout, &natural.importance, faces.as_ref(), is_of_features);
+            }
         }
     }
     if keys::have_lines(run.job) {

@@ -24,6 +24,19 @@ pub(crate) fn of_triangles(module: &LoadModule, layout: &Layout, mask: &Importan
     classes
 }
 
+/// Asks again for the classes of triangles that belong to no feature: parts of a split one may lie in another than it.
+pub fn classify_natural(
+    module: &mut LoadModule,
+    layout: &Layout,
+    mask: &Importance,
+    faces: Option<&Faces>,
+    is_of_features: impl Fn(u8) -> bool,
+) {
+    let found = of_triangles(module, layout, mask, faces);
+    let natural = module.classes.iter_mut().zip(found).filter(|(class, _)| !is_of_features(**class));
+    natural.for_each(|(class, found)| *class = found);
+}
+
 /// The class of most of the posts that each triangle owns, the smaller one where two have as many.
 ///
 /// A triangle that owns no post takes the class of the post nearest to its centroid.

@@ -15,6 +15,7 @@ mod concatenate;
 mod decks;
 pub use decks::{SPARE_MAX, cut_decks};
 mod clear;
+pub use classes::classify_natural;
 pub use clear::put_decks;
 mod lift;
 pub use lift::lift_decks;
