@@ -1,4 +1,4 @@
-//! Bridges and tunnels: their ends, straight between them, and heights along them.
+//! Bridges and tunnels: their ends, heights along them, and where they arch or sag between.
 
 use crate::sweep::{highest, lowest};
 use crate::{Kind, Network, Place};

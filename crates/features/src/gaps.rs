@@ -91,8 +91,8 @@ fn moves(ways: &[Way], numbers: &[usize], lattice: FeatureLattice) -> Vec<Move> 
         }
         let Some(to) = target(&segments[segment as usize], from, reach) else { return };
         let both = if dangling.contains(&to) { half(way) } else { 0 };
-        let reach = if is_ahead(&ways[way].places, last, to) { near.max(half(owner) + both) } else { near };
-        if reach * reach < from.squared_to(to) {
+        let own = if is_ahead(&ways[way].places, last, to) { near.max(half(owner) + both) } else { near };
+        if own * own < from.squared_to(to) {
             return;
         }
         // Of two dangling ends one goes to the other.

@@ -246,6 +246,13 @@ impl Ground {
         kept_or(slot, || self.with_given(area, tile, self.natural(area.tiling.rect(tile))?))
     }
 
+    /// The ground of a tile, with features burned in if there are any, where a stage has made it and it is kept.
+    pub fn made(&self, area: &GamingArea, tile: TileId) -> Option<Arc<Window>> {
+        let index = area.tiling.index(tile);
+        let natural = || self.kept.as_ref().map(|kept| &kept[index]);
+        self.lines.get().map_or_else(natural, |lines| lines.kept(index))?.get().cloned()
+    }
+
     /// Keeps windows without features no longer where there are such with them.
     pub fn forget_natural(&mut self) {
         if self.lines.get().is_some() {

@@ -277,11 +277,9 @@ fn read_tile(
     let ground = match ground {
         Some(ground) => {
             let rect = area.grid.posts_of_rect(inside);
-            // A whole tile may be known from its stages.
-            let window = match rect == area.tiling.rect(tile) {
-                true => ground.tile(area, tile)?,
-                false => Arc::new(ground.window(rect)?),
-            };
+            // Nothing is kept that no stage needs again.
+            let made = ground.made(area, tile).filter(|_| rect == area.tiling.rect(tile));
+            let window = made.map_or_else(|| ground.window(rect).map(Arc::new), Ok)?;
             Some(measured(&modules, &window, area, part))
         }
         None => None,
